@@ -1,0 +1,5 @@
+pub mod geometry;
+pub mod image;
+pub mod optics;
+pub mod papers;
+pub mod problem;

@@ -1,0 +1,216 @@
+//! The only error that a user sees: where, what, and what to do.
+//!
+//! A [`Problem`] is one thing that is wrong; [`Problems`] is what a reader hands back, since errors of meaning are
+//! reported all at once. Warnings are problems too, of [`Severity::Warning`]: the picture will come, and disappoint.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// A place in a text file, 1-based, with the line itself, so that the message can show it after the file has changed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct At {
+    pub file: PathBuf,
+    pub line: usize,
+    pub column: usize,
+    /// The whole source line, without its end.
+    pub source: String,
+    /// How many characters of that line the offending value takes, at least 1.
+    pub width: usize,
+}
+
+impl At {
+    /// The place of the bytes `span` in `text`, which is the content of `file`.
+    pub fn span(file: &Path, text: &str, span: std::ops::Range<usize>) -> At {
+        let mut start = span.start.min(text.len());
+        while !text.is_char_boundary(start) {
+            start -= 1;
+        }
+        let line_start = text[..start].rfind('\n').map_or(0, |i| i + 1);
+        let line_end = text[start..].find('\n').map_or(text.len(), |i| start + i);
+        let mut end = span.end.clamp(start, line_end.max(start));
+        while !text.is_char_boundary(end) {
+            end -= 1;
+        }
+        At {
+            file: file.to_path_buf(),
+            line: text[..start].matches('\n').count() + 1,
+            column: text[line_start..start].chars().count() + 1,
+            source: text[line_start..line_end].trim_end_matches('\r').to_string(),
+            width: text[start..end].chars().count().max(1),
+        }
+    }
+
+    /// A file as a whole (an image, a mesh): no line.
+    pub fn file(file: &Path) -> At {
+        At { file: file.to_path_buf(), line: 0, column: 0, source: String::new(), width: 1 }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    Error,
+    /// It renders, but will disappoint.
+    Warning,
+}
+
+/// The exit status that a problem leads to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// The files are wrong: 1.
+    Files,
+    /// The words on the command line are wrong: 2.
+    Words,
+    /// There is no adapter: 3.
+    Adapter,
+    /// A comparison failed: 4.
+    Comparison,
+    /// It could not finish: disk full, device lost, interrupted: 5.
+    Unfinished,
+}
+
+impl Cause {
+    pub fn exit_status(self) -> u8 {
+        match self {
+            Cause::Files => 1,
+            Cause::Words => 2,
+            Cause::Adapter => 3,
+            Cause::Comparison => 4,
+            Cause::Unfinished => 5,
+        }
+    }
+}
+
+/// One thing that is wrong.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Problem {
+    pub severity: Severity,
+    pub cause: Cause,
+    pub at: Option<At>,
+    /// The field's path in its file: `objects[0].transform.scale`.
+    pub path: Option<String>,
+    /// What is wrong, one sentence without a full stop.
+    pub what: String,
+    /// What to do about it, with the allowed range or the nearest right word.
+    pub hint: Option<String>,
+}
+
+impl Problem {
+    pub fn new(cause: Cause, what: impl Into<String>) -> Problem {
+        Problem { severity: Severity::Error, cause, at: None, path: None, what: what.into(), hint: None }
+    }
+    /// A problem of the files, the usual one.
+    pub fn files(what: impl Into<String>) -> Problem {
+        Problem::new(Cause::Files, what)
+    }
+    pub fn warning(what: impl Into<String>) -> Problem {
+        Problem { severity: Severity::Warning, ..Problem::files(what) }
+    }
+    pub fn at(mut self, at: At) -> Problem {
+        self.at = Some(at);
+        self
+    }
+    pub fn path(mut self, path: impl Into<String>) -> Problem {
+        self.path = Some(path.into());
+        self
+    }
+    pub fn hint(mut self, hint: impl Into<String>) -> Problem {
+        self.hint = Some(hint.into());
+        self
+    }
+    pub fn is_error(&self) -> bool {
+        self.severity == Severity::Error
+    }
+
+    /// The same facts for programs.
+    pub fn json(&self) -> serde_json::Value {
+        serde_json::json!({
+            "severity": if self.is_error() { "error" } else { "warning" },
+            "file": self.at.as_ref().map(|at| at.file.display().to_string()),
+            "line": self.at.as_ref().filter(|at| at.line > 0).map(|at| at.line),
+            "column": self.at.as_ref().filter(|at| at.line > 0).map(|at| at.column),
+            "path": self.path,
+            "what": self.what,
+            "hint": self.hint,
+        })
+    }
+}
+
+/// ```text
+/// scenes/a.ron:12:20: error: objects[0].transform.scale: 0 is not allowed
+///    |
+/// 12 |     transform: (scale: 0.0),
+///    |                        ^^^
+///    = hint: a number above 0
+/// ```
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(at) = &self.at {
+            match at.line {
+                0 => write!(f, "{}: ", at.file.display())?,
+                line => write!(f, "{}:{}:{}: ", at.file.display(), line, at.column)?,
+            }
+        }
+        write!(f, "{}: ", if self.is_error() { "error" } else { "warning" })?;
+        if let Some(path) = &self.path {
+            write!(f, "{path}: ")?;
+        }
+        write!(f, "{}", self.what)?;
+        if let Some(at) = self.at.as_ref().filter(|at| at.line > 0) {
+            let number = at.line.to_string();
+            let margin = " ".repeat(number.len());
+            // A tab stays a tab, so that the marks stand under their value.
+            let lead: String =
+                at.source.chars().take(at.column - 1).map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
+            write!(f, "\n{margin} |\n{number} | {}\n{margin} | {lead}{}", at.source, "^".repeat(at.width))?;
+            if let Some(hint) = &self.hint {
+                write!(f, "\n{margin} = hint: {hint}")?;
+            }
+        } else if let Some(hint) = &self.hint {
+            write!(f, "\n  hint: {hint}")?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for Problem {}
+
+/// All that is wrong with what was read, in the order of the files; never empty when it is an `Err`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Problems(pub Vec<Problem>);
+
+impl Problems {
+    pub fn cause(&self) -> Cause {
+        self.0.iter().find(|p| p.is_error()).map_or(Cause::Files, |p| p.cause)
+    }
+}
+
+impl From<Problem> for Problems {
+    fn from(problem: Problem) -> Problems {
+        Problems(vec![problem])
+    }
+}
+
+impl fmt::Display for Problems {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, problem) in self.0.iter().enumerate() {
+            if i > 0 {
+                writeln!(f)?;
+            }
+            write!(f, "{problem}")?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for Problems {}
+
+/// The word in `known` that `word` was probably meant to be.
+pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let lower = word.to_lowercase();
+    known
+        .into_iter()
+        .map(|k| (strsim::damerau_levenshtein(&lower, &k.to_lowercase()), k))
+        .filter(|(distance, k)| *distance <= 1 + k.len().min(word.len()) / 3)
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, k)| k)
+}
