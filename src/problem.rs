@@ -214,3 +214,7 @@ pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, k)| k)
 }
+
+/// How long work reports the share that is done, 0 to 1, and learns that nobody waits for it any more: an `Err` is to be
+/// passed up at once.
+pub type Tick<'a> = &'a (dyn Fn(f64) -> Result<(), Problem> + Sync);
