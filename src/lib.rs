@@ -3,3 +3,4 @@ pub mod image;
 pub mod optics;
 pub mod papers;
 pub mod problem;
+pub mod store;

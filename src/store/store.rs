@@ -1,0 +1,234 @@
+//! Where values live under their names: memory, then disk; and how what is missing gets made.
+
+use super::disk::Disk;
+use super::key::Key;
+use super::plan::{Plan, PlannedStep, Slot, Source, Value};
+use super::run::{Cancel, Run};
+use crate::problem::Problem;
+use std::any::Any;
+use std::collections::{HashMap, HashSet, VecDeque};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Where a value that was asked for came from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Origin {
+    Ran,
+    Memory,
+    Disk,
+}
+
+/// What would happen to a step if the plan's last value were asked for now.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct State {
+    pub origin: Origin,
+    /// Whether anything that must run asks for it.
+    pub needed: bool,
+}
+
+/// What happened to one step.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    pub name: &'static str,
+    pub about: String,
+    pub key: Key,
+    pub origin: Origin,
+    /// Its own time, without that of what it reads.
+    pub time: Duration,
+}
+
+/// Sees steps run; for progress bars, timings and the last line of a command.
+pub trait Watch: Sync {
+    fn started(&self, _step: &PlannedStep) {}
+    fn progress(&self, _step: &PlannedStep, _share: f64) {}
+    fn finished(&self, _finished: &Finished) {}
+    /// Something that does not stop the work.
+    fn warn(&self, _problem: &Problem) {}
+}
+
+struct Nobody;
+impl Watch for Nobody {}
+
+/// Values by name. A value stays in memory as long as one of the last few plans names it: not by when it was touched,
+/// since a value behind a hit is never touched, and is exactly what the next edit needs.
+pub struct Store {
+    values: HashMap<Key, Value>,
+    disk: Option<Disk>,
+    recent: VecDeque<HashSet<Key>>,
+    keep_plans: usize,
+    pub cancel: Cancel,
+}
+
+impl Store {
+    pub fn in_memory() -> Store {
+        Store { values: HashMap::new(), disk: None, recent: VecDeque::new(), keep_plans: 3, cancel: Cancel::default() }
+    }
+
+    pub fn on_disk(disk: Disk) -> Store {
+        Store { disk: Some(disk), ..Store::in_memory() }
+    }
+
+    /// How many of the last plans keep their values in memory, at least 1.
+    pub fn keep_plans(mut self, plans: usize) -> Store {
+        self.keep_plans = plans.max(1);
+        self
+    }
+
+    /// The value of a slot of a plan whose steps need no host.
+    pub fn get<T: Send + Sync + 'static>(&mut self, plan: &Plan, slot: Slot<T>) -> Result<Arc<T>, Problem> {
+        self.get_with(plan, slot, None, &Nobody)
+    }
+
+    /// The value of a slot; whatever is missing for it is made first, and nothing else.
+    pub fn get_with<T: Send + Sync + 'static>(
+        &mut self,
+        plan: &Plan,
+        slot: Slot<T>,
+        host: Option<&(dyn Any + Send + Sync)>,
+        watch: &dyn Watch,
+    ) -> Result<Arc<T>, Problem> {
+        self.remember(plan);
+        // Inputs come before the steps that read them, so a stack of places to visit is enough: a place whose inputs are
+        // not there yet waits under them.
+        let mut stack = vec![slot.index];
+        while let Some(&index) = stack.last() {
+            let step = &plan.steps()[index as usize];
+            if self.find(step, watch) {
+                stack.pop();
+                continue;
+            }
+            let missing: Vec<u32> =
+                step.inputs.iter().copied().filter(|&i| !self.find(&plan.steps()[i as usize], watch)).collect();
+            if missing.is_empty() {
+                self.run(plan, index, host, watch)?;
+                stack.pop();
+            } else {
+                stack.extend(missing.iter().rev());
+            }
+        }
+        let value = self.values[&slot.key()].clone();
+        Ok(value.downcast().expect("a slot's value has the slot's type"))
+    }
+
+    /// Whether a step's value is in memory by now; it may have come from disk.
+    fn find(&mut self, step: &PlannedStep, watch: &dyn Watch) -> bool {
+        if self.values.contains_key(&step.key) {
+            return true;
+        }
+        let started = Instant::now();
+        let (value, origin) = match &step.source {
+            Source::Given(value) => (Some(value.clone()), Origin::Memory),
+            Source::Pass(_) => (None, Origin::Ran),
+            Source::Bake(_, codec) => (self.from_disk(step, codec.decode, watch), Origin::Disk),
+        };
+        let Some(value) = value else { return false };
+        self.values.insert(step.key, value);
+        if origin == Origin::Disk {
+            watch.finished(&step.finished(origin, started.elapsed()));
+        }
+        true
+    }
+
+    fn from_disk(&self, step: &PlannedStep, decode: fn(&[u8]) -> Option<Value>, watch: &dyn Watch) -> Option<Value> {
+        let disk = self.disk.as_ref()?;
+        let content = disk.read(&step.key).unwrap_or_else(|problem| {
+            watch.warn(&problem);
+            None
+        })?;
+        decode(&content)
+    }
+
+    fn run(
+        &mut self,
+        plan: &Plan,
+        index: u32,
+        host: Option<&(dyn Any + Send + Sync)>,
+        watch: &dyn Watch,
+    ) -> Result<(), Problem> {
+        let step = &plan.steps()[index as usize];
+        let inputs: Vec<(u32, Value)> =
+            step.inputs.iter().map(|&i| (i, self.values[&plan.steps()[i as usize].key].clone())).collect();
+        let (function, codec) = match &step.source {
+            Source::Given(_) => unreachable!("a given value is always found"),
+            Source::Pass(function) => (function, None),
+            Source::Bake(function, codec) => (function, Some(codec)),
+        };
+        watch.started(step);
+        let started = Instant::now();
+        let progress = |share: f64| watch.progress(step, share);
+        let run = Run { name: step.name, inputs: &inputs, host, cancel: &self.cancel, progress: &progress };
+        run.tick(0.0)?;
+        let value = function(&run)?;
+        if let (Some(codec), Some(disk)) = (codec, &self.disk)
+            && let Err(problem) = disk.write(step.name, &step.key, &(codec.encode)(&value))
+        {
+            watch.warn(&problem);
+        }
+        self.values.insert(step.key, value);
+        watch.finished(&step.finished(Origin::Ran, started.elapsed()));
+        Ok(())
+    }
+
+    /// What asking for `slot` would do to each step of the plan, in the plan's order.
+    pub fn states<T>(&self, plan: &Plan, slot: Slot<T>) -> Vec<State> {
+        let mut states: Vec<State> = plan
+            .steps()
+            .iter()
+            .map(|step| {
+                let in_memory = step.is_given() || self.values.contains_key(&step.key);
+                let on_disk = || step.is_bake() && self.disk.as_ref().is_some_and(|disk| disk.holds(&step.key));
+                let origin = if in_memory {
+                    Origin::Memory
+                } else if on_disk() {
+                    Origin::Disk
+                } else {
+                    Origin::Ran
+                };
+                State { origin, needed: false }
+            })
+            .collect();
+        states[slot.index as usize].needed = true;
+        for i in (0..states.len()).rev() {
+            if states[i].needed && states[i].origin == Origin::Ran {
+                plan.steps()[i].inputs.iter().for_each(|&input| states[input as usize].needed = true);
+            }
+        }
+        states
+    }
+
+    pub fn disk(&self) -> Option<&Disk> {
+        self.disk.as_ref()
+    }
+
+    /// How many values are in memory.
+    pub fn len(&self) -> usize {
+        self.values.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+
+    /// Drops what no recent plan names.
+    fn remember(&mut self, plan: &Plan) {
+        let keys: HashSet<Key> = plan.keys().collect();
+        if self.recent.back() == Some(&keys) {
+            return;
+        }
+        self.recent.push_back(keys);
+        while self.recent.len() > self.keep_plans {
+            self.recent.pop_front();
+        }
+        let recent = &self.recent;
+        self.values.retain(|key, _| recent.iter().any(|keys| keys.contains(key)));
+    }
+}
+
+impl PlannedStep {
+    fn finished(&self, origin: Origin, time: Duration) -> Finished {
+        Finished { name: self.name, about: self.about.clone(), key: self.key, origin, time }
+    }
+}
+
+#[cfg(test)]
+mod tests;
