@@ -85,7 +85,7 @@ impl Cause {
 pub struct Problem {
     pub severity: Severity,
     pub cause: Cause,
-    pub at: Option<At>,
+    pub at: Option<Box<At>>,
     /// The field's path in its file: `objects[0].transform.scale`.
     pub path: Option<String>,
     /// What is wrong, one sentence without a full stop.
@@ -106,7 +106,7 @@ impl Problem {
         Problem { severity: Severity::Warning, ..Problem::files(what) }
     }
     pub fn at(mut self, at: At) -> Problem {
-        self.at = Some(at);
+        self.at = Some(Box::new(at));
         self
     }
     pub fn path(mut self, path: impl Into<String>) -> Problem {

@@ -12,7 +12,7 @@
 //! struct Square { of: f64 }
 //! impl Step for Square {
 //!     type Output = f64;
-//!     const NAME: &'static str = "square";
+//!     fn name(&self) -> &'static str { "square" }
 //!     fn about(&self) -> String { format!("{} times itself", self.of) }
 //!     fn run(&self, _: &Run) -> Result<f64, Problem> { Ok(self.of * self.of) }
 //! }
@@ -21,7 +21,7 @@
 //! struct Sum { of: Vec<Slot<f64>> }
 //! impl Step for Sum {
 //!     type Output = f64;
-//!     const NAME: &'static str = "sum";
+//!     fn name(&self) -> &'static str { "sum" }
 //!     fn about(&self) -> String { format!("{} numbers added up", self.of.len()) }
 //!     fn run(&self, run: &Run) -> Result<f64, Problem> { Ok(self.of.iter().map(|&slot| *run.get(slot)).sum()) }
 //! }
@@ -53,8 +53,8 @@ pub(super) type Value = Arc<dyn Any + Send + Sync>;
 /// its name they are its key, so whatever `run` depends on must be a field.
 pub trait Step: Serialize + Send + Sync + 'static {
     type Output: Send + Sync + 'static;
-    /// `room.what`: `frame.gbuffer`.
-    const NAME: &'static str;
+    /// `room.what`: `frame.gbuffer`. Steps that differ in what they compute differ in their name or in a field.
+    fn name(&self) -> &'static str;
     /// What it makes, for `explain`: half a sentence.
     fn about(&self) -> String;
     fn run(&self, run: &Run) -> Result<Self::Output, Problem>;
@@ -217,13 +217,14 @@ impl Plan {
         source: impl FnOnce(Box<RunFn>) -> Source,
     ) -> Slot<S::Output> {
         let mut spelling = Spelling::default();
-        spelling.write(S::NAME);
+        let name = step.name();
+        spelling.write(name);
         spelling.write(&code);
         spelling.write(&step);
         let (key, inputs) = spelling.finish();
-        debug_assert!(inputs.iter().all(|&i| (i as usize) < self.steps.len()), "{} reads another plan's slot", S::NAME);
+        debug_assert!(inputs.iter().all(|&i| (i as usize) < self.steps.len()), "{name} reads another plan's slot");
         let index = self.insert(key, || PlannedStep {
-            name: S::NAME,
+            name,
             about: step.about(),
             key,
             inputs,

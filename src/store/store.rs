@@ -119,7 +119,7 @@ impl Store {
         let (value, origin) = match &step.source {
             Source::Given(value) => (Some(value.clone()), Origin::Memory),
             Source::Pass(_) => (None, Origin::Ran),
-            Source::Bake(_, codec) => (self.from_disk(step, codec.decode, watch), Origin::Disk),
+            Source::Bake(_, codec) => (self.read_bake(step, codec.decode, watch), Origin::Disk),
         };
         let Some(value) = value else { return false };
         self.values.insert(step.key, value);
@@ -129,7 +129,7 @@ impl Store {
         true
     }
 
-    fn from_disk(&self, step: &PlannedStep, decode: fn(&[u8]) -> Option<Value>, watch: &dyn Watch) -> Option<Value> {
+    fn read_bake(&self, step: &PlannedStep, decode: fn(&[u8]) -> Option<Value>, watch: &dyn Watch) -> Option<Value> {
         let disk = self.disk.as_ref()?;
         let content = disk.read(&step.key).unwrap_or_else(|problem| {
             watch.warn(&problem);

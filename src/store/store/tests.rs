@@ -11,7 +11,9 @@ struct Add {
 }
 impl Step for Add {
     type Output = i64;
-    const NAME: &'static str = "test.add";
+    fn name(&self) -> &'static str {
+        "test.add"
+    }
     fn about(&self) -> String {
         format!("{} more", self.what)
     }
@@ -31,7 +33,9 @@ impl Bake for Add {
 struct Show(Slot<i64>);
 impl Step for Show {
     type Output = String;
-    const NAME: &'static str = "test.show";
+    fn name(&self) -> &'static str {
+        "test.show"
+    }
     fn about(&self) -> String {
         "a text".into()
     }
@@ -176,7 +180,9 @@ fn the_name_of_a_bake_holds_its_code() {
     struct Same(i64);
     impl Step for Same {
         type Output = i64;
-        const NAME: &'static str = "test.same";
+        fn name(&self) -> &'static str {
+            "test.same"
+        }
         fn about(&self) -> String {
             String::new()
         }
