@@ -1,4 +1,5 @@
 pub mod geometry;
+pub mod gpu;
 pub mod image;
 pub mod optics;
 pub mod papers;

@@ -6,14 +6,14 @@
 mod code;
 mod disk;
 mod files;
+mod get;
 mod key;
 mod plan;
 mod run;
-mod store;
 
 pub use disk::{Disk, Entry};
 pub use files::{File, Files};
+pub use get::{Finished, Origin, State, Store, Watch};
 pub use key::Key;
 pub use plan::{Bake, Plan, PlannedStep, Skipped, Slot, Step};
 pub use run::{Cancel, Run};
-pub use store::{Finished, Origin, State, Store, Watch};

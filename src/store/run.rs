@@ -4,7 +4,9 @@ use super::plan::{Slot, Value};
 use crate::problem::{Cause, Problem};
 use std::any::Any;
 use std::sync::Arc;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 /// Says to long work that nobody waits for it any more.
 #[derive(Clone, Default)]
@@ -26,6 +28,7 @@ pub struct Run<'a> {
     pub(super) host: Option<&'a (dyn Any + Send + Sync)>,
     pub(super) cancel: &'a Cancel,
     pub(super) progress: &'a (dyn Fn(f64) + Sync),
+    pub(super) measured: OnceLock<Duration>,
 }
 
 impl Run<'_> {
@@ -40,6 +43,11 @@ impl Run<'_> {
     pub fn host<T: Any>(&self) -> &T {
         let host = self.host.unwrap_or_else(|| panic!("{} needs a device, and the store was given none", self.name));
         host.downcast_ref().expect("the host is of the type that the steps expect")
+    }
+
+    /// Tells a time that the step measured better than the wall clock around it can: a device's own.
+    pub fn took(&self, time: Duration) {
+        self.measured.set(time).ok(); // the first measurement stands
     }
 
     /// Reports the share done, 0 to 1. An `Err` says that nobody waits any more: pass it up.

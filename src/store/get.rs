@@ -7,7 +7,7 @@ use super::run::{Cancel, Run};
 use crate::problem::Problem;
 use std::any::Any;
 use std::collections::{HashMap, HashSet, VecDeque};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 /// Where a value that was asked for came from.
@@ -156,16 +156,24 @@ impl Store {
         watch.started(step);
         let started = Instant::now();
         let progress = |share: f64| watch.progress(step, share);
-        let run = Run { name: step.name, inputs: &inputs, host, cancel: &self.cancel, progress: &progress };
+        let run = Run {
+            name: step.name,
+            inputs: &inputs,
+            host,
+            cancel: &self.cancel,
+            progress: &progress,
+            measured: OnceLock::new(),
+        };
         run.tick(0.0)?;
         let value = function(&run)?;
+        let time = run.measured.get().copied().unwrap_or_else(|| started.elapsed());
         if let (Some(codec), Some(disk)) = (codec, &self.disk)
             && let Err(problem) = disk.write(step.name, &step.key, &(codec.encode)(&value))
         {
             watch.warn(&problem);
         }
         self.values.insert(step.key, value);
-        watch.finished(&step.finished(Origin::Ran, started.elapsed()));
+        watch.finished(&step.finished(Origin::Ran, time));
         Ok(())
     }
 

@@ -25,7 +25,7 @@ impl Step for Add {
     }
 }
 impl Bake for Add {
-    const CODE: &'static [&'static str] = &["src/store/store/"];
+    const CODE: &'static [&'static str] = &["src/store/get/"];
 }
 
 /// The same, kept in memory only.

@@ -1,0 +1,268 @@
+//! The device: found, opened, waited for, and asked what went wrong.
+
+use super::texture::{Pool, Shape, Texture};
+use crate::problem::{Cause, Problem, nearest};
+use crate::store::{Key, Run};
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+/// What kind of pipeline a pass needs is known when it runs; each is made once.
+#[derive(Clone)]
+pub(super) enum Pipeline {
+    Render(wgpu::RenderPipeline, wgpu::BindGroupLayout),
+    Compute(wgpu::ComputePipeline, wgpu::BindGroupLayout),
+}
+
+/// An open device. It is the host that passes run on.
+pub struct Gpu {
+    pub device: wgpu::Device,
+    pub queue: wgpu::Queue,
+    pub adapter: wgpu::AdapterInfo,
+    /// Whether each pass is waited for, so that its time is its own.
+    pub timed: bool,
+    pub(super) pool: Pool,
+    pub(super) pipelines: Mutex<HashMap<Key, Pipeline>>,
+    errors: Arc<Mutex<Vec<String>>>,
+    has_timestamps: bool,
+}
+
+/// Whether an adapter computes on the CPU.
+pub fn is_software(info: &wgpu::AdapterInfo) -> bool {
+    info.device_type == wgpu::DeviceType::Cpu
+}
+
+fn instance() -> wgpu::Instance {
+    wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env())
+}
+
+/// All adapters of this machine, hardware first.
+pub fn adapters() -> Vec<wgpu::Adapter> {
+    let mut found = pollster::block_on(instance().enumerate_adapters(wgpu::Backends::PRIMARY));
+    found.sort_by_key(|adapter| match adapter.get_info().device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    });
+    found
+}
+
+/// What to do on a machine without an adapter.
+pub fn how_to_get_an_adapter() -> &'static str {
+    if cfg!(target_os = "linux") {
+        "install a Vulkan driver: `tools/start` does it on Debian and Ubuntu (packages libvulkan1 and \
+         mesa-vulkan-drivers, which also draws without a graphics card); on Fedora `dnf install mesa-vulkan-drivers \
+         vulkan-loader`, on Arch `pacman -S vulkan-swrast vulkan-icd-loader`"
+    } else {
+        "install your graphics card's driver"
+    }
+}
+
+impl Gpu {
+    /// Opens the adapter whose name contains `wanted`, or the best one.
+    pub fn open(wanted: Option<&str>) -> Result<Gpu, Problem> {
+        let adapters = adapters();
+        if adapters.is_empty() {
+            return Err(Problem::new(Cause::Adapter, "there is no graphics adapter").hint(how_to_get_an_adapter()));
+        }
+        let names: Vec<String> = adapters.iter().map(|adapter| adapter.get_info().name).collect();
+        let place = match wanted {
+            None => 0,
+            Some(wanted) => {
+                let lower = wanted.to_lowercase();
+                names.iter().position(|name| name.to_lowercase().contains(&lower)).ok_or_else(|| {
+                    let near = nearest(wanted, names.iter().map(String::as_str));
+                    let all = names.join("`, `");
+                    Problem::new(Cause::Adapter, format!("there is no adapter `{wanted}`"))
+                        .hint(near.map_or(format!("there is `{all}`"), |near| format!("did you mean `{near}`?")))
+                })?
+            }
+        };
+        let adapter = &adapters[place];
+        let wanted_features = wgpu::Features::TIMESTAMP_QUERY;
+        let features = adapter.features() & wanted_features;
+        // WebGPU's own limits, but for what large scenes and pictures need: as much as the adapter has.
+        let has = adapter.limits();
+        let limits = wgpu::Limits {
+            max_texture_dimension_2d: has.max_texture_dimension_2d,
+            max_buffer_size: has.max_buffer_size,
+            max_storage_buffer_binding_size: has.max_storage_buffer_binding_size,
+            ..wgpu::Limits::default()
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("diaphane"),
+            required_features: features,
+            required_limits: limits,
+            ..Default::default()
+        }))
+        .map_err(|error| {
+            Problem::new(Cause::Adapter, format!("the adapter `{}` cannot be opened: {error}", names[place]))
+                .hint("try another one with --adapter; `diaphane doctor` lists them")
+        })?;
+        let errors: Arc<Mutex<Vec<String>>> = Arc::default();
+        let log = errors.clone();
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            log.lock().expect("no panic while noting an error").push(error.to_string());
+        }));
+        Ok(Gpu {
+            device,
+            queue,
+            adapter: adapter.get_info(),
+            timed: false,
+            pool: Pool::default(),
+            pipelines: Mutex::default(),
+            errors,
+            has_timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
+        })
+    }
+
+    pub fn is_software(&self) -> bool {
+        is_software(&self.adapter)
+    }
+
+    pub fn texture(&self, shape: Shape) -> Texture {
+        self.pool.take(&self.device, shape)
+    }
+
+    /// A buffer with content; an empty one gets 16 bytes, since WebGPU knows no empty bindings.
+    pub fn buffer(&self, bytes: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        let size = (bytes.len().max(16) as u64).next_multiple_of(16);
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size,
+            usage: usage | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: true,
+        });
+        if let Ok(mut mapped) = buffer.get_mapped_range_mut(..) {
+            mapped.slice(..bytes.len()).copy_from_slice(bytes);
+        }
+        buffer.unmap();
+        buffer
+    }
+
+    /// Two timestamps around a pass, where they can be believed: on a graphics card and when somebody asks.
+    pub(super) fn stopwatch(&self) -> Option<wgpu::QuerySet> {
+        (self.timed && self.has_timestamps && !self.is_software()).then(|| {
+            self.device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: None,
+                ty: wgpu::QueryType::Timestamp,
+                count: 2,
+            })
+        })
+    }
+
+    /// Sends a pass off; when passes are timed, waits for it.
+    pub(super) fn submit(
+        &self,
+        run: &Run,
+        name: &str,
+        mut encoder: wgpu::CommandEncoder,
+        stopwatch: Option<wgpu::QuerySet>,
+    ) -> Result<(), Problem> {
+        let resolved = stopwatch.map(|queries| {
+            let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+                label: None,
+                size: 256,
+                usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+                mapped_at_creation: false,
+            });
+            encoder.resolve_query_set(&queries, 0..2, &buffer, 0);
+            buffer
+        });
+        self.queue.submit([encoder.finish()]);
+        if self.timed {
+            self.wait()?;
+        }
+        self.check(name)?;
+        if let Some(buffer) = resolved {
+            let bytes = self.read_buffer(&buffer, 16)?;
+            let ticks = |i: usize| u64::from_le_bytes(bytes[8 * i..8 * i + 8].try_into().expect("8 bytes"));
+            let nanoseconds = ticks(1).saturating_sub(ticks(0)) as f64 * self.queue.get_timestamp_period() as f64;
+            run.took(Duration::from_nanos(nanoseconds as u64));
+        }
+        Ok(())
+    }
+
+    /// Waits until everything that was sent off is done.
+    pub fn wait(&self) -> Result<(), Problem> {
+        self.device.poll(wgpu::PollType::wait_indefinitely()).map(|_| ()).map_err(|error| lost(&error.to_string()))
+    }
+
+    /// What the device has complained of since it was last asked.
+    pub fn check(&self, name: &str) -> Result<(), Problem> {
+        let errors = std::mem::take(&mut *self.errors.lock().expect("no panic while noting an error"));
+        match errors.first() {
+            None => Ok(()),
+            Some(error) if error.contains("Out of Memory") || error.contains("out of memory") => {
+                Err(Problem::new(Cause::Unfinished, format!("{name}: the device is out of memory"))
+                    .hint("render a smaller --size, or with fewer samples per pixel (antialias: 1)"))
+            }
+            Some(error) => Err(Problem::new(Cause::Unfinished, format!("{name}: the device refused: {error}"))
+                .hint("this is a mistake in the shader or in the program; `diaphane doctor` shows the adapter")),
+        }
+    }
+
+    /// The first `bytes` of a buffer.
+    pub fn read_buffer(&self, buffer: &wgpu::Buffer, bytes: u64) -> Result<Vec<u8>, Problem> {
+        let staging = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: bytes,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, bytes);
+        self.queue.submit([encoder.finish()]);
+        self.map(&staging)
+    }
+
+    /// The texels of a texture's first layer, row by row, top first.
+    pub fn read_texture(&self, texture: &Texture) -> Result<Vec<u8>, Problem> {
+        let row = texture.shape.width * texture.shape.format.bytes_per_texel();
+        let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let staging = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: padded as u64 * texture.shape.height as u64,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        encoder.copy_texture_to_buffer(
+            texture.texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &staging,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(padded),
+                    rows_per_image: Some(texture.shape.height),
+                },
+            },
+            wgpu::Extent3d { depth_or_array_layers: 1, ..texture.shape.extent() },
+        );
+        self.queue.submit([encoder.finish()]);
+        let bytes = self.map(&staging)?;
+        Ok(bytes.chunks_exact(padded as usize).flat_map(|line| &line[..row as usize]).copied().collect())
+    }
+
+    fn map(&self, staging: &wgpu::Buffer) -> Result<Vec<u8>, Problem> {
+        let (sender, receiver) = std::sync::mpsc::channel();
+        staging.slice(..).map_async(wgpu::MapMode::Read, move |result| {
+            sender.send(result).ok(); // nobody listens when the wait below has failed already
+        });
+        self.wait()?;
+        self.check("reading back")?;
+        match receiver.try_recv() {
+            Ok(Ok(())) => {}
+            _ => return Err(lost("nothing could be read back")),
+        }
+        let bytes = staging.get_mapped_range(..).map_err(|error| lost(&error.to_string()))?.to_vec();
+        staging.unmap();
+        Ok(bytes)
+    }
+}
+
+fn lost(why: &str) -> Problem {
+    Problem::new(Cause::Unfinished, format!("the device was lost: {why}")).hint("run the same command again")
+}

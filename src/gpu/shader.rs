@@ -1,0 +1,256 @@
+//! WGSL with includes: found, joined, named, checked by naga before a driver sees it, and mapped back to the lines that
+//! people wrote.
+//!
+//! `#include "lib/sphere.wgsl"` on a line of its own brings that file, once however often it is named. Paths are relative
+//! to the shader folder. One file is one pass: its entry points are called `vertex`, `fragment` and `compute`.
+//!
+//! The program carries its shaders with it; a shader folder on disk replaces them, and is read anew for every plan, so
+//! that an edit shows at once.
+
+use crate::problem::{At, Problem};
+use crate::store::{Files, Key};
+use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+use serde::{Serialize, Serializer};
+use std::collections::{BTreeSet, HashMap};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+
+include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
+
+/// Where a line of joined text came from.
+struct Line {
+    file: Arc<PathBuf>,
+    /// 1-based.
+    number: usize,
+}
+
+/// A shader that naga accepted. It serialises as the name of its joined text, so an edit anywhere in it is a new pass.
+#[derive(Clone)]
+pub struct Shader(Arc<Checked>);
+
+pub struct Checked {
+    pub name: String,
+    pub key: Key,
+    pub text: String,
+    pub module: naga::Module,
+    pub info: ModuleInfo,
+}
+
+impl std::ops::Deref for Shader {
+    type Target = Checked;
+    fn deref(&self) -> &Checked {
+        &self.0
+    }
+}
+
+impl Serialize for Shader {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.key.serialize(serializer)
+    }
+}
+
+impl std::fmt::Debug for Shader {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Shader({:?}, {:?})", self.name, self.key)
+    }
+}
+
+/// All shaders, from a folder or from the program itself. What was checked once is not checked again.
+pub struct Shaders {
+    folder: Option<PathBuf>,
+    files: Arc<Files>,
+    checked: Mutex<HashMap<Key, Result<Shader, Problem>>>,
+}
+
+impl Shaders {
+    /// Shaders from `folder`, or those that the program carries.
+    pub fn new(folder: Option<PathBuf>, files: Arc<Files>) -> Shaders {
+        Shaders { folder, files, checked: Mutex::default() }
+    }
+
+    /// The shader folder that an artist would expect to be read: the one that the environment names, the one here, the
+    /// one that the program was built from; else none.
+    pub fn usual_folder() -> Option<PathBuf> {
+        if let Some(folder) = std::env::var_os("DIAPHANE_SHADERS") {
+            return Some(folder.into());
+        }
+        let is_ours = |folder: &PathBuf| EMBEDDED.iter().all(|(name, _)| folder.join(name).is_file());
+        let built_from = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
+        [PathBuf::from("shaders"), built_from].into_iter().find(is_ours)
+    }
+
+    pub fn folder(&self) -> Option<&Path> {
+        self.folder.as_deref()
+    }
+
+    /// All shaders that the program carries, by name.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        EMBEDDED.iter().map(|(name, _)| *name)
+    }
+
+    /// The shader `name` (`frame/gbuffer.wgsl`) with all that it includes.
+    pub fn load(&self, name: &str) -> Result<Shader, Problem> {
+        let mut text = String::new();
+        let mut lines = Vec::new();
+        self.join(name, None, &mut text, &mut lines, &mut BTreeSet::new())?;
+        let key = Key::of(&(name, &text));
+        if let Some(known) = self.checked.lock().expect("no panic while checking").get(&key) {
+            return known.clone();
+        }
+        let checked = check(name, key, text, &lines);
+        self.checked.lock().expect("no panic while checking").insert(key, checked.clone());
+        checked
+    }
+
+    fn source(&self, name: &str) -> Result<(PathBuf, String), String> {
+        match &self.folder {
+            Some(folder) => {
+                let path = folder.join(name);
+                let file = self.files.read(&path).map_err(|error| error.to_string())?;
+                let text = std::str::from_utf8(&file.bytes).map_err(|_| "it is not UTF-8 text".to_string())?;
+                Ok((path, text.to_string()))
+            }
+            None => EMBEDDED
+                .iter()
+                .find(|(known, _)| *known == name)
+                .map(|(_, text)| (Path::new("shaders").join(name), text.to_string()))
+                .ok_or_else(|| "the program carries no such shader".to_string()),
+        }
+    }
+
+    fn join(
+        &self,
+        name: &str,
+        included_at: Option<At>,
+        text: &mut String,
+        lines: &mut Vec<Line>,
+        seen: &mut BTreeSet<String>,
+    ) -> Result<(), Problem> {
+        if !seen.insert(name.to_string()) {
+            return Ok(());
+        }
+        let (path, source) = self.source(name).map_err(|why| {
+            let known = crate::problem::nearest(name, Shaders::names());
+            let problem = Problem::files(format!("the shader {name} cannot be read: {why}"))
+                .hint(known.map_or("restore the file".into(), |near| format!("there is {near}")));
+            match included_at {
+                Some(at) => problem.at(at),
+                None => problem,
+            }
+        })?;
+        let file = Arc::new(path);
+        let mut offset = 0;
+        for (i, line) in source.lines().enumerate() {
+            match line.trim().strip_prefix("#include") {
+                Some(rest) => {
+                    let at = At::span(&file, &source, offset..offset + line.len());
+                    let wanted = rest.trim().strip_prefix('"').and_then(|r| r.strip_suffix('"')).ok_or_else(|| {
+                        Problem::files("an include names no file").at(at.clone()).hint("#include \"lib/sphere.wgsl\"")
+                    })?;
+                    self.join(wanted, Some(at), text, lines, seen)?;
+                }
+                None => {
+                    text.push_str(line);
+                    text.push('\n');
+                    lines.push(Line { file: file.clone(), number: i + 1 });
+                }
+            }
+            offset += line.len() + 1;
+        }
+        Ok(())
+    }
+}
+
+fn check(name: &str, key: Key, text: String, lines: &[Line]) -> Result<Shader, Problem> {
+    let module = naga::front::wgsl::parse_str(&text).map_err(|error| {
+        let span = error.location(&text).map(|l| l.offset as usize..(l.offset + l.length) as usize);
+        let notes: Vec<_> = error.labels().map(|(_, note)| note).filter(|note| !note.is_empty()).collect();
+        let problem = Problem::files(format!("the shader {name} is wrong: {}", error.message()));
+        place(problem, &text, lines, span).hint(if notes.is_empty() {
+            "mend it and save".into()
+        } else {
+            notes.join("; ")
+        })
+    })?;
+    // Whatever the device lacks, it says itself; here only what no device can do is found.
+    let info = Validator::new(ValidationFlags::all(), Capabilities::all()).validate(&module).map_err(|error| {
+        let span = error.spans().next().and_then(|(span, _)| span.to_range());
+        let mut what = format!("the shader {name} is wrong: {error}");
+        let mut source: Option<&dyn std::error::Error> = std::error::Error::source(error.as_inner());
+        while let Some(cause) = source {
+            what += &format!(": {cause}");
+            source = cause.source();
+        }
+        place(Problem::files(what), &text, lines, span).hint("mend it and save")
+    })?;
+    Ok(Shader(Arc::new(Checked { name: name.to_string(), key, text, module, info })))
+}
+
+/// Puts a problem at the line that somebody wrote, rather than at that of the joined text.
+fn place(problem: Problem, text: &str, lines: &[Line], span: Option<std::ops::Range<usize>>) -> Problem {
+    let Some(span) = span else { return problem };
+    let mut at = At::span(Path::new(""), text, span);
+    match lines.get(at.line - 1).or(lines.last()) {
+        Some(line) => {
+            at.file = line.file.to_path_buf();
+            at.line = line.number;
+            problem.at(at)
+        }
+        None => problem,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shaders(files: &[(&str, &str)]) -> (tempfile::TempDir, Shaders) {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, text) in files {
+            std::fs::write(folder.path().join(name), text).unwrap();
+        }
+        let shaders = Shaders::new(Some(folder.path().into()), Arc::default());
+        (folder, shaders)
+    }
+
+    #[test]
+    fn every_shader_that_the_program_carries_is_valid() {
+        let shaders = Shaders::new(None, Arc::default());
+        for name in Shaders::names() {
+            shaders.load(name).unwrap_or_else(|problem| panic!("{problem}"));
+        }
+    }
+
+    #[test]
+    fn an_include_comes_once_and_errors_name_the_line_that_was_written() {
+        let (_folder, good) = shaders(&[
+            ("a.wgsl", "#include \"b.wgsl\"\n#include \"b.wgsl\"\nfn a() -> f32 { return b(); }\n"),
+            ("b.wgsl", "fn b() -> f32 { return 1.0; }\n"),
+        ]);
+        assert_eq!(good.load("a.wgsl").unwrap().text.matches("fn b").count(), 1);
+
+        let (_folder, bad) = shaders(&[
+            ("a.wgsl", "#include \"b.wgsl\"\n\nfn a() -> f32 { return b(); }\n"),
+            ("b.wgsl", "// one\nfn b() -> f32 {\n  return oops;\n}\n"),
+        ]);
+        let problem = bad.load("a.wgsl").unwrap_err();
+        let at = problem.at.unwrap();
+        assert!(at.file.ends_with("b.wgsl"));
+        assert_eq!((at.line, at.column, at.width), (3, 10, 4), "{}", problem.what);
+        assert!(problem.what.contains("oops"), "{}", problem.what);
+    }
+
+    #[test]
+    fn validation_and_missing_files_have_places_too() {
+        let (_folder, wrong) = shaders(&[("a.wgsl", "fn a() -> f32 {\n  return 1u;\n}\n")]);
+        assert_eq!(wrong.load("a.wgsl").unwrap_err().at.unwrap().line, 1.max(1));
+        let (_folder, missing) = shaders(&[("a.wgsl", "// x\n#include \"c.wgsl\"\n")]);
+        let problem = missing.load("a.wgsl").unwrap_err();
+        assert_eq!(problem.at.unwrap().line, 2);
+        let (_folder, cycle) = shaders(&[
+            ("a.wgsl", "#include \"b.wgsl\"\nconst x = 1;\n"),
+            ("b.wgsl", "#include \"a.wgsl\"\nconst y = 2;\n"),
+        ]);
+        cycle.load("a.wgsl").unwrap();
+    }
+}

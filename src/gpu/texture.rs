@@ -1,0 +1,141 @@
+//! Textures as values, and the pool that they go back to: orbiting makes new names every frame, and no new memory.
+
+use serde::Serialize;
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex};
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+pub enum Format {
+    Rgba32Float,
+    Rgba16Float,
+    R32Float,
+    Rgba32Uint,
+    Rgba8Unorm,
+    Depth32Float,
+}
+
+impl Format {
+    pub fn wgpu(self) -> wgpu::TextureFormat {
+        match self {
+            Format::Rgba32Float => wgpu::TextureFormat::Rgba32Float,
+            Format::Rgba16Float => wgpu::TextureFormat::Rgba16Float,
+            Format::R32Float => wgpu::TextureFormat::R32Float,
+            Format::Rgba32Uint => wgpu::TextureFormat::Rgba32Uint,
+            Format::Rgba8Unorm => wgpu::TextureFormat::Rgba8Unorm,
+            Format::Depth32Float => wgpu::TextureFormat::Depth32Float,
+        }
+    }
+
+    pub fn bytes_per_texel(self) -> u32 {
+        match self {
+            Format::Rgba32Float | Format::Rgba32Uint => 16,
+            Format::Rgba16Float => 8,
+            Format::R32Float | Format::Rgba8Unorm | Format::Depth32Float => 4,
+        }
+    }
+
+    pub fn is_depth(self) -> bool {
+        self == Format::Depth32Float
+    }
+
+    /// Whether every device can filter it; a 32-bit float is read texel by texel.
+    pub fn is_filterable(self) -> bool {
+        matches!(self, Format::Rgba16Float | Format::Rgba8Unorm)
+    }
+}
+
+/// What a texture is, apart from its content.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+pub struct Shape {
+    pub width: u32,
+    pub height: u32,
+    /// More than one, or an array by nature: the shader sees `texture_2d_array`.
+    pub layers: u32,
+    pub array: bool,
+    pub format: Format,
+}
+
+impl Shape {
+    pub fn flat(size: (u32, u32), format: Format) -> Shape {
+        Shape { width: size.0, height: size.1, layers: 1, array: false, format }
+    }
+
+    pub fn array(size: (u32, u32), layers: u32, format: Format) -> Shape {
+        Shape { width: size.0, height: size.1, layers, array: true, format }
+    }
+
+    pub fn extent(&self) -> wgpu::Extent3d {
+        wgpu::Extent3d { width: self.width, height: self.height, depth_or_array_layers: self.layers }
+    }
+
+    pub fn bytes(&self) -> u64 {
+        self.width as u64 * self.height as u64 * self.layers as u64 * self.format.bytes_per_texel() as u64
+    }
+}
+
+/// A texture; when nobody holds it any more, its memory goes back to the pool.
+pub struct Texture {
+    pub shape: Shape,
+    pub texture: wgpu::Texture,
+    /// All layers, as a shader sees them.
+    pub view: wgpu::TextureView,
+    pool: Pool,
+}
+
+impl Texture {
+    /// One layer, to be drawn to.
+    pub fn layer(&self, layer: u32) -> wgpu::TextureView {
+        self.texture.create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2),
+            base_array_layer: layer,
+            array_layer_count: Some(1),
+            ..Default::default()
+        })
+    }
+}
+
+impl Drop for Texture {
+    fn drop(&mut self) {
+        let mut free = self.pool.0.lock().expect("no panic while pooling");
+        free.push_back((self.shape, self.texture.clone()));
+        while free.len() > MOST_FREE || free.iter().map(|(shape, _)| shape.bytes()).sum::<u64>() > MOST_FREE_BYTES {
+            free.pop_front();
+        }
+    }
+}
+
+const MOST_FREE: usize = 32;
+const MOST_FREE_BYTES: u64 = 512 << 20;
+
+/// Textures that nobody holds, oldest first. A pass writes all of what it makes, so old content is never seen.
+#[derive(Clone, Default)]
+pub struct Pool(Arc<Mutex<VecDeque<(Shape, wgpu::Texture)>>>);
+
+impl Pool {
+    pub fn take(&self, device: &wgpu::Device, shape: Shape) -> Texture {
+        let mut free = self.0.lock().expect("no panic while pooling");
+        let found =
+            free.iter().rposition(|(s, _)| *s == shape).and_then(|i| free.remove(i)).map(|(_, texture)| texture);
+        drop(free);
+        let texture = found.unwrap_or_else(|| {
+            use wgpu::TextureUsages as Usage;
+            device.create_texture(&wgpu::TextureDescriptor {
+                label: None,
+                size: shape.extent(),
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: shape.format.wgpu(),
+                usage: Usage::TEXTURE_BINDING
+                    | Usage::RENDER_ATTACHMENT
+                    | Usage::COPY_SRC
+                    | if shape.format.is_depth() { Usage::empty() } else { Usage::COPY_DST },
+                view_formats: &[],
+            })
+        });
+        let dimension = if shape.array { wgpu::TextureViewDimension::D2Array } else { wgpu::TextureViewDimension::D2 };
+        let view =
+            texture.create_view(&wgpu::TextureViewDescriptor { dimension: Some(dimension), ..Default::default() });
+        Texture { shape, texture, view, pool: self.clone() }
+    }
+}
