@@ -7,7 +7,7 @@
 //! let blurred = plan.add(Fullscreen {
 //!     name: "example.blur",
 //!     about: "the picture, blurred".into(),
-//!     shader: shaders.load("example/blur.wgsl")?,
+//!     shader: shaders.load("example/blur.wgsl", &[])?,
 //!     size: (960, 540),
 //!     targets: vec![Format::Rgba16Float],
 //!     binds: vec![("picture", Bind::Texture(picture, 0))],

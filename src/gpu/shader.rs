@@ -2,7 +2,9 @@
 //! people wrote.
 //!
 //! `#include "lib/sphere.wgsl"` on a line of its own brings that file, once however often it is named. Paths are relative
-//! to the shader folder. One file is one pass: its entry points are called `vertex`, `fragment` and `compute`.
+//! to the shader folder. Lines between `#if NAME` and `#endif` (or `#else`) are there only when the pass asks for NAME: what
+//! a scene does not need is absent, not switched off. One file is one pass: its entry points are called `vertex`,
+//! `fragment` and `compute`.
 //!
 //! The program carries its shaders with it; a shader folder on disk replaces them, and is read anew for every plan, so
 //! that an edit shows at once.
@@ -88,11 +90,11 @@ impl Shaders {
         EMBEDDED.iter().map(|(name, _)| *name)
     }
 
-    /// The shader `name` (`frame/gbuffer.wgsl`) with all that it includes.
-    pub fn load(&self, name: &str) -> Result<Shader, Problem> {
-        let mut text = String::new();
-        let mut lines = Vec::new();
-        self.join(name, None, &mut text, &mut lines, &mut BTreeSet::new())?;
+    /// The shader `name` (`frame/gbuffer.wgsl`) with all that it includes, and the lines that `flags` ask for.
+    pub fn load(&self, name: &str, flags: &[&str]) -> Result<Shader, Problem> {
+        let mut joined = Joined { flags, text: String::new(), lines: Vec::new(), seen: BTreeSet::new() };
+        self.join(name, None, &mut joined)?;
+        let Joined { text, lines, .. } = joined;
         let key = Key::of(&(name, &text));
         if let Some(known) = self.checked.lock().expect("no panic while checking").get(&key) {
             return known.clone();
@@ -118,15 +120,8 @@ impl Shaders {
         }
     }
 
-    fn join(
-        &self,
-        name: &str,
-        included_at: Option<At>,
-        text: &mut String,
-        lines: &mut Vec<Line>,
-        seen: &mut BTreeSet<String>,
-    ) -> Result<(), Problem> {
-        if !seen.insert(name.to_string()) {
+    fn join(&self, name: &str, included_at: Option<At>, joined: &mut Joined) -> Result<(), Problem> {
+        if !joined.seen.insert(name.to_string()) {
             return Ok(());
         }
         let (path, source) = self.source(name).map_err(|why| {
@@ -140,25 +135,45 @@ impl Shaders {
         })?;
         let file = Arc::new(path);
         let mut offset = 0;
+        // Whether each open `#if` lets its lines through.
+        let mut open: Vec<bool> = Vec::new();
         for (i, line) in source.lines().enumerate() {
-            match line.trim().strip_prefix("#include") {
-                Some(rest) => {
-                    let at = At::span(&file, &source, offset..offset + line.len());
-                    let wanted = rest.trim().strip_prefix('"').and_then(|r| r.strip_suffix('"')).ok_or_else(|| {
-                        Problem::files("an include names no file").at(at.clone()).hint("#include \"lib/sphere.wgsl\"")
-                    })?;
-                    self.join(wanted, Some(at), text, lines, seen)?;
+            let at = || At::span(&file, &source, offset..offset + line.len());
+            let words: Vec<&str> = line.split_whitespace().collect();
+            match words.as_slice() {
+                ["#if", flag] => open.push(joined.flags.contains(flag)),
+                ["#else"] if !open.is_empty() => open.iter_mut().next_back().into_iter().for_each(|o| *o = !*o),
+                ["#endif"] if !open.is_empty() => drop(open.pop()),
+                _ if open.contains(&false) => {}
+                ["#include", wanted] if wanted.len() > 2 && wanted.starts_with('"') && wanted.ends_with('"') => {
+                    self.join(wanted.trim_matches('"'), Some(at()), joined)?;
                 }
-                None => {
-                    text.push_str(line);
-                    text.push('\n');
-                    lines.push(Line { file: file.clone(), number: i + 1 });
+                [word, ..] if word.starts_with('#') => {
+                    return Err(Problem::files(format!("`{}` is no instruction here", line.trim()))
+                        .at(at())
+                        .hint("#include \"lib/sphere.wgsl\", #if NAME, #else and #endif are"));
+                }
+                _ => {
+                    joined.text.push_str(line);
+                    joined.text.push('\n');
+                    joined.lines.push(Line { file: file.clone(), number: i + 1 });
                 }
             }
             offset += line.len() + 1;
         }
-        Ok(())
+        match open.is_empty() {
+            true => Ok(()),
+            false => Err(Problem::files("an #if is never closed").at(At::span(&file, &source, 0..0)).hint("add #endif")),
+        }
     }
+}
+
+/// A shader on its way to being one text.
+struct Joined<'a> {
+    flags: &'a [&'a str],
+    text: String,
+    lines: Vec<Line>,
+    seen: BTreeSet<String>,
 }
 
 fn check(name: &str, key: Key, text: String, lines: &[Line]) -> Result<Shader, Problem> {
@@ -217,7 +232,7 @@ mod tests {
     fn every_shader_that_the_program_carries_is_valid() {
         let shaders = Shaders::new(None, Arc::default());
         for name in Shaders::names() {
-            shaders.load(name).unwrap_or_else(|problem| panic!("{problem}"));
+            shaders.load(name, &[]).unwrap_or_else(|problem| panic!("{problem}"));
         }
     }
 
@@ -227,13 +242,13 @@ mod tests {
             ("a.wgsl", "#include \"b.wgsl\"\n#include \"b.wgsl\"\nfn a() -> f32 { return b(); }\n"),
             ("b.wgsl", "fn b() -> f32 { return 1.0; }\n"),
         ]);
-        assert_eq!(good.load("a.wgsl").unwrap().text.matches("fn b").count(), 1);
+        assert_eq!(good.load("a.wgsl", &[]).unwrap().text.matches("fn b").count(), 1);
 
         let (_folder, bad) = shaders(&[
             ("a.wgsl", "#include \"b.wgsl\"\n\nfn a() -> f32 { return b(); }\n"),
             ("b.wgsl", "// one\nfn b() -> f32 {\n  return oops;\n}\n"),
         ]);
-        let problem = bad.load("a.wgsl").unwrap_err();
+        let problem = bad.load("a.wgsl", &[]).unwrap_err();
         let at = problem.at.unwrap();
         assert!(at.file.ends_with("b.wgsl"));
         assert_eq!((at.line, at.column, at.width), (3, 10, 4), "{}", problem.what);
@@ -242,15 +257,22 @@ mod tests {
 
     #[test]
     fn validation_and_missing_files_have_places_too() {
-        let (_folder, wrong) = shaders(&[("a.wgsl", "fn a() -> f32 {\n  return 1u;\n}\n")]);
-        assert_eq!(wrong.load("a.wgsl").unwrap_err().at.unwrap().line, 1.max(1));
+        let (_folder, wrong) = shaders(&[("a.wgsl", "// one\nfn a() -> f32 {\n  return 1u;\n}\n")]);
+        assert_eq!(wrong.load("a.wgsl", &[]).unwrap_err().at.unwrap().line, 2);
         let (_folder, missing) = shaders(&[("a.wgsl", "// x\n#include \"c.wgsl\"\n")]);
-        let problem = missing.load("a.wgsl").unwrap_err();
+        let problem = missing.load("a.wgsl", &[]).unwrap_err();
         assert_eq!(problem.at.unwrap().line, 2);
         let (_folder, cycle) = shaders(&[
             ("a.wgsl", "#include \"b.wgsl\"\nconst x = 1;\n"),
             ("b.wgsl", "#include \"a.wgsl\"\nconst y = 2;\n"),
         ]);
-        cycle.load("a.wgsl").unwrap();
+        cycle.load("a.wgsl", &[]).unwrap();
+    }
+
+    #[test]
+    fn flags_choose_lines() {
+        let (_folder, shaders) = shaders(&[("a.wgsl", "#if A\nconst a = 1;\n#else\nconst b = 1;\n#endif\n")]);
+        assert_eq!(shaders.load("a.wgsl", &["A"]).unwrap().text, "const a = 1;\n");
+        assert_eq!(shaders.load("a.wgsl", &[]).unwrap().text, "const b = 1;\n");
     }
 }
