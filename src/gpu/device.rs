@@ -126,6 +126,22 @@ impl Gpu {
         self.pool.take(&self.device, shape)
     }
 
+    /// A texture with content: all layers, row by row, top first.
+    pub fn texture_with(&self, shape: Shape, bytes: &[u8]) -> Texture {
+        let texture = self.texture(shape);
+        self.queue.write_texture(
+            texture.texture.as_image_copy(),
+            bytes,
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(shape.width * shape.format.bytes_per_texel()),
+                rows_per_image: Some(shape.height),
+            },
+            shape.extent(),
+        );
+        texture
+    }
+
     /// A buffer with content; an empty one gets 16 bytes, since WebGPU knows no empty bindings.
     pub fn buffer(&self, bytes: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
         let size = (bytes.len().max(16) as u64).next_multiple_of(16);

@@ -38,7 +38,8 @@ pub struct Draw {
     pub instance: u32,
 }
 
-/// One layer of a raster pass, with what differs between layers.
+/// One layer of a raster pass, with what differs between layers. Without meshes to draw, a shader that includes
+/// `lib/fullscreen.wgsl` runs for every pixel of the layer.
 #[derive(Clone, Serialize)]
 pub struct Layer {
     pub binds: Vec<(&'static str, Bind)>,
@@ -144,6 +145,9 @@ impl Step for Raster {
             });
             pass.set_pipeline(&pipeline);
             pass.set_bind_group(0, &group, &[]);
+            if self.shader.is_fullscreen() {
+                pass.draw(0..3, 0..1);
+            }
             for draw in &layer.draws {
                 for (location, stream) in draw.streams.iter().enumerate() {
                     pass.set_vertex_buffer(location as u32, run.get(*stream).buffer.slice(..));

@@ -57,6 +57,13 @@ impl std::fmt::Debug for Shader {
     }
 }
 
+impl Checked {
+    /// Whether the vertex shader reads no vertices but makes its own triangle.
+    pub(super) fn is_fullscreen(&self) -> bool {
+        self.text.contains("@builtin(vertex_index)")
+    }
+}
+
 /// All shaders, from a folder or from the program itself. What was checked once is not checked again.
 pub struct Shaders {
     folder: Option<PathBuf>,

@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex};
 pub enum Format {
     Rgba32Float,
     Rgba16Float,
+    R16Float,
     R32Float,
     Rgba32Uint,
     Rgba8Unorm,
@@ -19,6 +20,7 @@ impl Format {
         match self {
             Format::Rgba32Float => wgpu::TextureFormat::Rgba32Float,
             Format::Rgba16Float => wgpu::TextureFormat::Rgba16Float,
+            Format::R16Float => wgpu::TextureFormat::R16Float,
             Format::R32Float => wgpu::TextureFormat::R32Float,
             Format::Rgba32Uint => wgpu::TextureFormat::Rgba32Uint,
             Format::Rgba8Unorm => wgpu::TextureFormat::Rgba8Unorm,
@@ -30,6 +32,7 @@ impl Format {
         match self {
             Format::Rgba32Float | Format::Rgba32Uint => 16,
             Format::Rgba16Float => 8,
+            Format::R16Float => 2,
             Format::R32Float | Format::Rgba8Unorm | Format::Depth32Float => 4,
         }
     }
@@ -40,7 +43,7 @@ impl Format {
 
     /// Whether every device can filter it; a 32-bit float is read texel by texel.
     pub fn is_filterable(self) -> bool {
-        matches!(self, Format::Rgba16Float | Format::Rgba8Unorm)
+        matches!(self, Format::Rgba16Float | Format::R16Float | Format::Rgba8Unorm)
     }
 }
 

@@ -1,0 +1,5 @@
+// Which element a compute invocation works on: workgroups of 64, 32768 side by side.
+
+fn element(id: vec3u) -> u32 {
+    return id.x + id.y * (32768u * 64u);
+}

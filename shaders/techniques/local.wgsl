@@ -1,0 +1,83 @@
+// Light that leaves where it entered: a surface that scatters the irradiance which its normal gathers.
+//
+// The normal may be any that a technique hands over. Radiance out = (1 - F_out) scatter E, with E the irradiance that
+// got in, and scatter = albedo / (c pi) such that all of `albedo` leaves.
+
+#include "frame/scene.wgsl"
+#include "frame/surface.wgsl"
+#include "frame/lights.wgsl"
+#include "optics/fresnel.wgsl"
+
+@group(0) @binding(0) var<uniform> camera: Camera;
+@group(0) @binding(1) var<storage, read> objects: array<Object>;
+@group(0) @binding(2) var packed_map: texture_2d<u32>;
+#if LIGHTS
+@group(0) @binding(3) var<storage, read> lights: array<Light>;
+#endif
+#if SHADOWS
+@group(0) @binding(4) var visibility: texture_2d_array<f32>;
+#endif
+
+struct Vertex {
+    @invariant @builtin(position) clip: vec4f,
+    @location(0) position: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) @interpolate(flat) object: u32,
+#if ENVIRONMENT
+    @location(3) environment: vec3f,
+#endif
+}
+
+@vertex
+fn vertex(
+    @builtin(instance_index) index: u32,
+    @location(0) position: vec3f,
+    @location(1) normal: vec3f,
+#if ENVIRONMENT
+    @location(2) environment: vec4f,
+#endif
+) -> Vertex {
+    var out: Vertex;
+    out.position = eye_from_object(objects[index], position);
+    out.clip = camera.clip_from_eye * vec4f(out.position, 1.0);
+    out.normal = turned(objects[index], normal);
+    out.object = index;
+#if ENVIRONMENT
+    out.environment = environment.rgb;
+#endif
+    return out;
+}
+
+@fragment
+fn fragment(in: Vertex) -> @location(0) vec4f {
+    let object = objects[in.object];
+    let pixel = vec2i(in.clip.xy);
+    let normal_out = unpack_direction(textureLoad(packed_map, pixel, 0).x);
+    var entered = vec3f(0.0);
+#if ENVIRONMENT
+    entered += in.environment;
+#endif
+#if LIGHTS
+    let inverse_length = 1.0 / max(length(in.normal), 1e-20);
+    for (var l = 0u; l < arrayLength(&lights); l++) {
+        let light = lights[l];
+        var from_light = vec3f(0.0);
+        for (var i = 0; i < light_samples(light); i++) {
+            let light_in = incident(light, i, in.position);
+            let cos_length = max(0.0, dot(in.normal, light_in.direction));
+            let enters = 1.0 - fresnel_dielectric(min(1.0, cos_length * inverse_length), object.eta);
+            from_light += cos_length * enters * light_in.irradiance;
+        }
+#if SHADOWS
+        if light.visibility >= 0 {
+            from_light *= textureLoad(visibility, pixel, light.visibility, 0).r;
+        }
+#endif
+        entered += from_light;
+    }
+#endif
+    // Where an interpolated normal turns away from the eye, the surface is seen edge on.
+    let cos_out = max(0.0, dot(normal_out, -normalize(in.position)));
+    let leaves = 1.0 - fresnel_dielectric(cos_out, object.eta);
+    return vec4f(leaves * object.scatter * entered, 1.0);
+}

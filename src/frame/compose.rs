@@ -1,0 +1,231 @@
+//! What follows the techniques: gloss, what passes through, the sum, and the picture.
+
+use super::shape::{self, Stream};
+use super::{DEPTH, Frame, Item, PACKED, POSITION, Part, Thing, tables};
+use crate::gpu::{Bind, Blend, Depth, Format, Fullscreen, Gpu, Images, Layer, Raster, Sampler};
+use crate::image::Image;
+use crate::problem::Problem;
+use crate::scene::Substance;
+use crate::store::{Plan, Run, Slot, Step};
+use glam::DVec3;
+use serde::Serialize;
+
+/// An optical depth through which less than 1e-8 of the light comes.
+const THICK: f64 = 18.5;
+
+impl Frame<'_> {
+    /// Light reflected at the boundaries, added once for every technique. None when nothing mirrors.
+    pub(crate) fn gloss(&self, plan: &mut Plan, gbuffer: Slot<Images>) -> Result<Option<Slot<Images>>, Problem> {
+        if !self.view.part.has(Part::Glossy) {
+            plan.skip("gloss", "the picture shows another part");
+            return Ok(None);
+        }
+        let mirrors = |item: &Item| self.material(item).is_some_and(|m| m.surface.ior != 1.0 || !self.view.skip);
+        for item in self.items.iter().filter(|item| self.material(item).is_some() && !mirrors(item)) {
+            plan.skip(format!("gloss of `{}`", item.name), "its index of refraction is 1");
+        }
+        let sky = self.sky_binds(plan, true);
+        let lights = self.lights_bind();
+        if lights.is_none() && sky.is_none() || !self.items.iter().any(|item| item.in_view && mirrors(item)) {
+            return Ok(None);
+        }
+        let mut flags = Vec::new();
+        let mut binds = vec![
+            ("camera", self.camera_bind()),
+            ("objects", self.objects_bind()),
+            ("packed_map", Bind::Texture(gbuffer, PACKED)),
+        ];
+        if let Some(lights) = lights {
+            flags.push("LIGHTS");
+            binds.push(("lights", lights));
+        }
+        if let Some(visibility) = self.visibility(plan, gbuffer)? {
+            flags.push("SHADOWS");
+            binds.push(("visibility", Bind::Texture(visibility, 0)));
+        }
+        if let Some((sky_flags, sky_binds)) = sky {
+            flags.extend(sky_flags);
+            binds.extend(sky_binds);
+            binds.push(("albedo_table", Bind::Texture(self.gloss_albedos(plan), 0)));
+            binds.push(("linear", Bind::Sampler(Sampler::Linear)));
+        }
+        // Those whose sky is partly hidden bring how open it is with their vertices; the others do without.
+        let mut open = Vec::new();
+        let mut hidden = Vec::new();
+        for (place, item) in self.items.iter().enumerate().filter(|(_, item)| item.in_view && mirrors(item)) {
+            let openness = self.openness(plan, item)?;
+            let mut streams = vec![shape::upload(plan, item.mesh, Stream::Positions)];
+            streams.extend(openness);
+            let draw = crate::gpu::Draw {
+                streams,
+                indices: shape::upload(plan, item.mesh, Stream::Indices),
+                instance: place as u32,
+            };
+            if openness.is_some() { hidden.push(draw) } else { open.push(draw) }
+        }
+        let mut made = Vec::new();
+        for (draws, occluded) in [(hidden, true), (open, false)] {
+            if draws.is_empty() {
+                continue;
+            }
+            let mut flags = flags.clone();
+            if occluded {
+                flags.push("OCCLUDED");
+            }
+            made.push(plan.add(Raster {
+                name: "frame.gloss",
+                about: format!("light mirrored by {} thing(s)", draws.len()),
+                shader: self.shaders.load("frame/gloss.wgsl", &flags)?,
+                size: self.view.sampled_size(),
+                targets: vec![(Format::Rgba32Float, Blend::Replace)],
+                depth: Depth::Equal(gbuffer, DEPTH),
+                layers: vec![Layer { binds: Vec::new(), draws }],
+                array: false,
+                binds: binds.clone(),
+            }));
+        }
+        self.merge(plan, &made)
+    }
+
+    /// One map from several that are 0 where another is not. None of none.
+    pub(crate) fn merge(&self, plan: &mut Plan, maps: &[Slot<Images>]) -> Result<Option<Slot<Images>>, Problem> {
+        let Some((first, rest)) = maps.split_first() else { return Ok(None) };
+        let mut sum = *first;
+        for map in rest {
+            sum = plan.add(Fullscreen {
+                name: "frame.merge",
+                about: "two kinds of objects in one picture".into(),
+                shader: self.shaders.load("frame/merge.wgsl", &[])?,
+                size: self.view.sampled_size(),
+                targets: vec![Format::Rgba32Float],
+                binds: vec![("one", Bind::Texture(sum, 0)), ("other", Bind::Texture(*map, 0))],
+            });
+        }
+        Ok(Some(sum))
+    }
+
+    /// The optical depth along each ray through what is thin enough to be seen through. None when nothing is.
+    fn depth_through(&self, plan: &mut Plan) -> Result<Option<Slot<Images>>, Problem> {
+        let mut clear = false;
+        for item in self.items.iter().filter(|item| item.in_view) {
+            let Some(Substance::Translucent(medium)) = self.material(item).map(|m| &m.medium) else { continue };
+            let sigma_t = medium.sigma_t().min_element() * self.scene.mm_per_unit;
+            let center = item.corners.iter().sum::<DVec3>() / 8.0;
+            let across = 2.0 * item.corners.iter().map(|p| p.distance(center)).fold(0.0, f64::max);
+            // Thin places let light through even where the whole does not: ask for a hundredth of its size.
+            let depth = 0.01 * sigma_t * across;
+            match depth < THICK || !self.view.skip {
+                true => clear = true,
+                false => plan.skip(
+                    format!("light straight through `{}`", item.name),
+                    format!("a hundredth of it is {depth:.0} mean free paths thick"),
+                ),
+            }
+        }
+        if !clear {
+            return Ok(None);
+        }
+        let draws = self.draws(plan, |item| matches!(item.thing, Thing::Object(_)), |_, _| Vec::new());
+        Ok(Some(plan.add(Raster {
+            name: "frame.through",
+            about: "the optical depth along each ray".into(),
+            shader: self.shaders.load("frame/unscattered.wgsl", &[])?,
+            size: self.view.sampled_size(),
+            targets: vec![(Format::Rgba16Float, Blend::Add)],
+            depth: Depth::Off,
+            layers: vec![Layer { binds: Vec::new(), draws }],
+            array: false,
+            binds: vec![("camera", self.camera_bind()), ("objects", self.objects_bind())],
+        })))
+    }
+
+    /// The sum of the parts that the view shows, linear, at the sampled size.
+    pub(crate) fn compose(
+        &self,
+        plan: &mut Plan,
+        gbuffer: Slot<Images>,
+        scattered: Option<Slot<Images>>,
+        glossy: Option<Slot<Images>>,
+    ) -> Result<Slot<Images>, Problem> {
+        let mut flags = Vec::new();
+        let mut binds = vec![
+            ("camera", self.camera_bind()),
+            ("objects", self.objects_bind()),
+            ("position_map", Bind::Texture(gbuffer, POSITION)),
+            ("packed_map", Bind::Texture(gbuffer, PACKED)),
+        ];
+        if let Some(scattered) = scattered {
+            flags.push("SCATTERED");
+            binds.push(("scattered", Bind::Texture(scattered, 0)));
+        }
+        if let Some(glossy) = glossy {
+            flags.push("GLOSSY");
+            binds.push(("glossy", Bind::Texture(glossy, 0)));
+        }
+        if self.view.part.has(Part::Unscattered) {
+            flags.push("UNSCATTERED");
+            if let Some((sky_flags, sky_binds)) = self.sky_binds(plan, false) {
+                flags.extend(sky_flags);
+                binds.extend(sky_binds);
+                if let Some(through) = self.depth_through(plan)? {
+                    flags.push("THROUGH");
+                    binds.push(("depth_through", Bind::Texture(through, 0)));
+                }
+            }
+        }
+        Ok(plan.add(Fullscreen {
+            name: "frame.compose",
+            about: "the sum of scattered, glossy and unscattered light".into(),
+            shader: self.shaders.load("frame/compose.wgsl", &flags)?,
+            size: self.view.sampled_size(),
+            targets: vec![Format::Rgba32Float],
+            binds,
+        }))
+    }
+
+    /// Samples become pixels, and the picture comes back from the device.
+    pub(crate) fn picture(&self, plan: &mut Plan, composed: Slot<Images>) -> Result<Slot<Image>, Problem> {
+        let samples = self.view.antialias;
+        let resolved = match samples {
+            1 => composed,
+            _ => plan.add(Fullscreen {
+                name: "frame.resolve",
+                about: format!("the mean of {} samples per pixel", samples * samples),
+                shader: self.shaders.load("frame/resolve.wgsl", &[])?,
+                size: self.view.size,
+                targets: vec![Format::Rgba32Float],
+                binds: vec![
+                    ("resolve", Bind::uniform(&tables::Resolve { samples })),
+                    ("picture", Bind::Texture(composed, 0)),
+                ],
+            }),
+        };
+        Ok(plan.add(ReadBack { picture: resolved }))
+    }
+}
+
+/// From the device to an image.
+#[derive(Serialize)]
+struct ReadBack {
+    picture: Slot<Images>,
+}
+
+impl Step for ReadBack {
+    type Output = Image;
+    fn name(&self) -> &'static str {
+        "frame.image"
+    }
+    fn about(&self) -> String {
+        "the picture, linear, back from the device".into()
+    }
+    fn run(&self, run: &Run) -> Result<Image, Problem> {
+        let images = run.get(self.picture);
+        let texture = &images.0[0];
+        let bytes = run.host::<Gpu>().read_texture(texture)?;
+        let pixels = bytes
+            .chunks_exact(16)
+            .map(|texel| std::array::from_fn(|c| f32::from_le_bytes(texel[4 * c..4 * c + 4].try_into().expect("4 bytes"))))
+            .collect();
+        Ok(Image { width: texture.shape.width, height: texture.shape.height, pixels })
+    }
+}
