@@ -48,7 +48,7 @@ pub fn fresnel_moment(order: u32, eta: f64) -> f64 {
     // cosine c outside, where eta² mu dmu = c dc and F is the same from both sides.
     let total = critical_cosine(eta).powi(order + 1) / f64::from(order + 1);
     let partial = integrate(&rule, |c| {
-        let mu = (((eta - 1.0) * (eta + 1.0) + c * c).sqrt()) / eta;
+        let mu = refracted_cosine(c, eta).expect("a denser medium refracts every ray");
         c * mu.powi(order - 1) * fresnel_dielectric(c, eta)
     });
     total + partial / (eta * eta)

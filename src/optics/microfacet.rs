@@ -96,7 +96,7 @@ fn lobe_albedo(cos: f64, roughness: f64, fresnel: impl Fn(f64) -> f64) -> f64 {
     sum / (CAP_NODES as f64 * (1.0 + z_eye))
 }
 
-/// Per axis of the cap: about 1e-3 of the albedo at worst, where part of the lobe is below the horizon.
+/// Per axis of the cap: errs by about 3e-4 of the albedo at worst, where part of the lobe is below the horizon.
 const CAP_NODES: usize = 48;
 
 #[cfg(test)]

@@ -44,7 +44,7 @@ const FRANCOIS_2006: [Layer; 3] = [
     ("fish organs", [1.0, 1.0, 2.0], [1.5, 1.5, 2.5], 0.80),
 ];
 
-/// All presets, by source and then by name.
+/// All presets: those of [Jensen2001] by name, then the fish from the outside inwards.
 pub fn presets() -> impl Iterator<Item = Preset> {
     let jensen = JENSEN_2001.into_iter().map(|(name, sigma_s_prime, sigma_a, ior)| Preset {
         name,

@@ -40,7 +40,8 @@ mod tests {
 
     #[test]
     fn roots_are_found_to_the_last_bits_with_few_evaluations() {
-        let cases: [(fn(f64) -> f64, f64, f64, f64); 5] = [
+        type Case = (fn(f64) -> f64, f64, f64, f64);
+        let cases: [Case; 5] = [
             (|x| x * x - 2.0, 0.0, 2.0, std::f64::consts::SQRT_2),
             (|x| x.powi(9) - 1e-9, 0.0, 1.0, 0.1),
             (|x| x - 1e-12, 0.0, 1.0, 1e-12),
