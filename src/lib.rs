@@ -1,7 +1,13 @@
+pub mod commands;
+pub mod frame;
 pub mod geometry;
 pub mod gpu;
 pub mod image;
 pub mod optics;
 pub mod papers;
 pub mod problem;
+pub mod render;
+pub mod scene;
+pub mod session;
 pub mod store;
+pub mod techniques;

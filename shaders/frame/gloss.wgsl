@@ -75,10 +75,10 @@ fn fragment(in: Vertex) -> @location(0) vec4f {
             if cos_in > 0.0 {
                 let half_way = normalize(light_in.direction + to_eye);
                 // A sample stands for its cell of the light: the lobe is widened by what the cell subtends.
-                let alpha = sqrt(pow(rough, 4.0) + 0.25 * light_in.spread * light_in.spread);
-                let lobe = ggx_d(dot(normal, half_way), alpha) * ggx_g2(cos_in, cos_out, alpha)
-                    * fresnel_dielectric(max(0.0, dot(half_way, to_eye)), object.eta) / (4.0 * cos_out);
-                from_light += lobe * light_in.irradiance;
+                let widened = pow(pow(rough, 4.0) + 0.25 * light_in.spread * light_in.spread, 0.25);
+                from_light += ggx_lobe(cos_in, cos_out, min(1.0, dot(normal, half_way)), min(1.0, widened))
+                    * fresnel_dielectric(saturate(dot(half_way, to_eye)), object.eta)
+                    * light_in.irradiance;
             }
         }
 #if SHADOWS
@@ -95,7 +95,10 @@ fn fragment(in: Vertex) -> @location(0) vec4f {
 #if OCCLUDED
     open = saturate(in.openness.x + dot(in.openness.yzw, mirrored));
 #endif
-    let albedo = textureSampleLevel(albedo_table, linear, vec2f(cos_out, roughness), in.object, 0.0).r;
+    // The table's first and last texel stand for 0 and 1.
+    let size = vec2f(textureDimensions(albedo_table));
+    let place = (vec2f(min(1.0, cos_out), roughness) * (size - 1.0) + 0.5) / size;
+    let albedo = textureSampleLevel(albedo_table, linear, place, in.object, 0.0).r;
     radiance += open * albedo * sky_reflected(mirrored, roughness);
 #endif
     return vec4f(radiance, 1.0);

@@ -19,7 +19,7 @@ mod sky;
 mod surface;
 mod tables;
 
-pub use surface::Surface;
+pub use surface::{Member, Surface};
 
 use crate::geometry::mesh::Mesh;
 use crate::gpu::{Bind, Blend, Buffer, Depth, Draw, Format, Images, Layer, Raster, Shaders};
@@ -224,6 +224,14 @@ impl<'a> Frame<'a> {
         }
     }
 
+    /// Sets how far above an item's surface its shadows are looked up, mm; a tenth of the item at most.
+    pub(crate) fn set_entry(&mut self, place: usize, entry_mm: f64) {
+        let item = &mut self.items[place];
+        let center = item.corners.iter().sum::<DVec3>() / 8.0;
+        let radius = item.corners.iter().map(|p| p.distance(center)).fold(0.0, f64::max);
+        item.entry = (entry_mm / self.scene.mm_per_unit).min(0.2 * radius);
+    }
+
     pub(crate) fn material(&self, item: &Item) -> Option<&Material> {
         self.object(item).map(|object| object.material.as_ref())
     }
@@ -348,4 +356,10 @@ pub(crate) const DEPTH: usize = 2;
 /// out: albedo / (c pi), with c the hemispherical mean of that transmittance, so that all of the albedo leaves.
 fn scatter(material: &Material) -> DVec3 {
     material.albedo / (std::f64::consts::PI * diffuse_transmittance(material.surface.ior))
+}
+
+/// The longest side of the box in which an object lies before it is placed, scene units.
+pub fn extent(object: &Object) -> f64 {
+    let (min, max) = shape::bounds(object);
+    (max - min).max_element()
 }

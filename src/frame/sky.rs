@@ -319,7 +319,7 @@ struct GlossAlbedo {
     eta: f64,
 }
 
-const ALBEDO_TABLE: u32 = 32;
+const ALBEDO_TABLE: usize = 32;
 
 impl Step for GlossAlbedo {
     type Output = Vec<f32>;
@@ -331,13 +331,8 @@ impl Step for GlossAlbedo {
     }
     fn run(&self, run: &Run) -> Result<Vec<f32>, Problem> {
         run.tick(0.0)?;
-        let at = |i: u32| (i as f64 + 0.5) / ALBEDO_TABLE as f64;
-        Ok((0..ALBEDO_TABLE * ALBEDO_TABLE)
-            .into_par_iter()
-            .map(|i| {
-                microfacet::directional_albedo(at(i % ALBEDO_TABLE), at(i / ALBEDO_TABLE), self.eta) as f32
-            })
-            .collect())
+        let table = microfacet::directional_albedo_table(self.eta, ALBEDO_TABLE, ALBEDO_TABLE);
+        Ok(table.into_iter().map(|v| v as f32).collect())
     }
 }
 
@@ -360,7 +355,7 @@ impl Step for UploadAlbedos {
         "the tables of gloss to the device".into()
     }
     fn run(&self, run: &Run) -> Result<Images, Problem> {
-        let zeros = vec![f16::ZERO; (ALBEDO_TABLE * ALBEDO_TABLE) as usize];
+        let zeros = vec![f16::ZERO; ALBEDO_TABLE * ALBEDO_TABLE];
         let halves: Vec<f16> = self
             .tables
             .iter()
@@ -369,7 +364,7 @@ impl Step for UploadAlbedos {
                 None => zeros.clone(),
             })
             .collect();
-        let shape = Shape::array((ALBEDO_TABLE, ALBEDO_TABLE), self.tables.len() as u32, Format::R16Float);
+        let shape = Shape::array((ALBEDO_TABLE as u32, ALBEDO_TABLE as u32), self.tables.len() as u32, Format::R16Float);
         Ok(Images(vec![run.host::<Gpu>().texture_with(shape, bytemuck::cast_slice(&halves))]))
     }
 }

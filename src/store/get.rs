@@ -88,9 +88,21 @@ impl Store {
         watch: &dyn Watch,
     ) -> Result<Arc<T>, Problem> {
         self.remember(plan);
+        self.make(plan, slot.index, host, watch)?;
+        let value = self.values[&slot.key()].clone();
+        Ok(value.downcast().expect("a slot's value has the slot's type"))
+    }
+
+    fn make(
+        &mut self,
+        plan: &Plan,
+        index: u32,
+        host: Option<&(dyn Any + Send + Sync)>,
+        watch: &dyn Watch,
+    ) -> Result<(), Problem> {
         // Inputs come before the steps that read them, so a stack of places to visit is enough: a place whose inputs are
         // not there yet waits under them.
-        let mut stack = vec![slot.index];
+        let mut stack = vec![index];
         while let Some(&index) = stack.last() {
             let step = &plan.steps()[index as usize];
             if self.find(step, watch) {
@@ -106,8 +118,18 @@ impl Store {
                 stack.extend(missing.iter().rev());
             }
         }
-        let value = self.values[&slot.key()].clone();
-        Ok(value.downcast().expect("a slot's value has the slot's type"))
+        Ok(())
+    }
+
+    /// Makes every bake of a plan that is not there yet, with whatever it reads; passes stay unmade, so no host is needed.
+    pub fn bake(&mut self, plan: &Plan, watch: &dyn Watch) -> Result<(), Problem> {
+        self.remember(plan);
+        for (index, step) in plan.steps().iter().enumerate() {
+            if step.is_bake() {
+                self.make(plan, index as u32, None, watch)?;
+            }
+        }
+        Ok(())
     }
 
     /// Whether a step's value is in memory by now; it may have come from disk.

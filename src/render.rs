@@ -1,0 +1,122 @@
+//! The straight line from scene to image. Start reading at [`plan`].
+
+use crate::frame::{Frame, Part, Surface, Thing, View};
+use crate::gpu::Shaders;
+use crate::image::Image;
+use crate::problem::{Problem, Problems};
+use crate::scene::{Scene, Substance, TechniqueText};
+use crate::store::{Plan, Slot};
+use crate::techniques::{self, Technique};
+
+/// What somebody wants to see: a scene holds the physics, this holds the method.
+#[derive(Clone, Debug)]
+pub struct Look {
+    pub view: View,
+    /// For every object that names none of its own.
+    pub technique: TechniqueText,
+}
+
+impl Look {
+    /// As the scene's file says.
+    pub fn of(scene: &Scene) -> Look {
+        Look {
+            view: View {
+                camera: scene.camera,
+                size: scene.view.size,
+                antialias: scene.view.antialias,
+                time_s: scene.view.time_s,
+                part: Part::Full,
+                skip: true,
+            },
+            technique: scene.view.technique.clone(),
+        }
+    }
+}
+
+/// The plan for one picture: a plain list of steps, made without a device, in the order in which light would have it.
+pub fn plan(scene: &Scene, look: &Look, shaders: &Shaders) -> Result<(Plan, Slot<Image>), Problem> {
+    let mut plan = Plan::default();
+
+    // Who is in the picture, and which technique is whose.
+    let mut frame = Frame::new(scene, &look.view, shaders, &mut plan);
+    let groups = assign(&mut frame, look, &mut plan)?;
+
+    // What is seen.
+    let gbuffer = frame.gbuffer(&mut plan)?;
+
+    // Light that went through: each technique for its own objects.
+    let mut scattered = Vec::new();
+    for Group { technique, items, .. } in groups {
+        let surface = Surface { frame: &frame, items, gbuffer };
+        scattered.push(technique.plan(&mut plan, &surface)?);
+    }
+    let scattered = frame.merge(&mut plan, &scattered)?;
+
+    // Light that did not, and the sum.
+    let glossy = frame.gloss(&mut plan, gbuffer)?;
+    let composed = frame.compose(&mut plan, gbuffer, scattered, glossy)?;
+    let picture = frame.picture(&mut plan, composed)?;
+    Ok((plan, picture))
+}
+
+/// Objects that share a technique with the same settings.
+struct Group {
+    ron: String,
+    technique: Box<dyn Technique>,
+    items: Vec<usize>,
+}
+
+/// Which technique renders which of the frame's items. Opaque things are rendered as such whatever the view names.
+fn assign(frame: &mut Frame, look: &Look, plan: &mut Plan) -> Result<Vec<Group>, Problem> {
+    let mut groups: Vec<Group> = Vec::new();
+    if !look.view.part.has(Part::Scattered) {
+        plan.skip("scattered light", "the picture shows another part");
+        return Ok(groups);
+    }
+    for place in 0..frame.items.len() {
+        let Thing::Object(i) = frame.items[place].thing else { continue };
+        let object = &frame.scene.objects[i];
+        let text = match object.material.medium {
+            Substance::Opaque { .. } => &TechniqueText::from_flag("opaque", "Opaque()")?,
+            Substance::Translucent(_) => object.technique.as_ref().unwrap_or(&look.technique),
+        };
+        let group = match groups.iter().position(|group| group.ron == text.ron) {
+            Some(found) => found,
+            None => {
+                let technique = techniques::read(text)?;
+                groups.push(Group { ron: text.ron.clone(), technique, items: Vec::new() });
+                groups.len() - 1
+            }
+        };
+        let entry_mm = groups[group].technique.entry_mm(&object.material);
+        frame.set_entry(place, entry_mm);
+        if frame.items[place].in_view {
+            groups[group].items.push(place);
+        }
+    }
+    groups.retain(|group| !group.items.is_empty());
+    Ok(groups)
+}
+
+/// What the techniques that a scene names have to say of their settings and of the materials they are to render.
+pub fn check(scene: &Scene) -> Result<(), Problems> {
+    let mut problems = Vec::new();
+    let mut known: Vec<(&str, Box<dyn Technique>)> = Vec::new();
+    let named = scene.objects.iter().filter_map(|object| object.technique.as_ref());
+    for text in std::iter::once(&scene.view.technique).chain(named) {
+        match techniques::read(text) {
+            Ok(technique) => known.push((&text.ron, technique)),
+            Err(problem) => problems.push(problem),
+        }
+    }
+    for object in scene.objects.iter().filter(|object| object.material.medium.medium().is_some()) {
+        let text = object.technique.as_ref().unwrap_or(&scene.view.technique);
+        let technique = known.iter().find(|(ron, _)| *ron == text.ron);
+        if let Some(problem) = technique.and_then(|(_, technique)| technique.refuses(&object.material)) {
+            let what = format!("the material of `{}`: {}", object.name, problem.what);
+            problems.push(text.problem("", what).hint(problem.hint.unwrap_or_default()));
+        }
+    }
+    problems.dedup();
+    if problems.is_empty() { Ok(()) } else { Err(Problems(problems)) }
+}

@@ -1,0 +1,52 @@
+//! Light that leaves where it entered, for a normal that may be any: one raster pass on the G-buffer's surfaces.
+
+use crate::frame::{Member, Surface};
+use crate::gpu::{Bind, Blend, Buffer, Format, Layer, Raster};
+use crate::problem::Problem;
+use crate::store::{Plan, Slot};
+
+use super::Scattered;
+
+/// Scatters the irradiance that each member's `normals` gather. Whatever the normals are, the steps are the same.
+pub(super) fn scatter(
+    plan: &mut Plan,
+    surface: &Surface,
+    mut normals: impl FnMut(&mut Plan, &Member) -> Result<Slot<Buffer>, Problem>,
+) -> Result<Scattered, Problem> {
+    let mut flags = Vec::new();
+    let mut binds: Vec<(&'static str, Bind)> =
+        vec![("camera", surface.camera()), ("objects", surface.objects()), ("packed_map", surface.packed())];
+    if let Some(lights) = surface.lights() {
+        flags.push("LIGHTS");
+        binds.push(("lights", lights));
+    }
+    if let Some(visibility) = surface.visibility(plan)? {
+        flags.push("SHADOWS");
+        binds.push(("visibility", visibility));
+    }
+    let mut draws = Vec::new();
+    let mut environment = false;
+    for member in surface.members() {
+        let normals = normals(plan, &member)?;
+        let mut streams = vec![normals];
+        if let Some(sky) = surface.environment(plan, &member, normals)? {
+            environment = true;
+            streams.push(sky);
+        }
+        draws.push(surface.draw(plan, &member, streams));
+    }
+    if environment {
+        flags.push("ENVIRONMENT");
+    }
+    Ok(plan.add(Raster {
+        name: "technique.local",
+        about: format!("light that {} thing(s) scatter where it entered", draws.len()),
+        shader: surface.shader("techniques/local.wgsl", &flags)?,
+        size: surface.size(),
+        targets: vec![(Format::Rgba32Float, Blend::Replace)],
+        depth: surface.depth(),
+        layers: vec![Layer { binds: Vec::new(), draws }],
+        array: false,
+        binds,
+    }))
+}

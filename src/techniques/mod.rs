@@ -1,0 +1,100 @@
+//! The ways of making light that went through something: one folder each, one line each in [`REGISTRY`].
+//!
+//! A technique plans its steps for the objects of a [`Surface`] and hands back [`Scattered`]: light that entered, was
+//! scattered and came out again, linear, without gloss, without the surface's colour, 0 where the objects are not. Its
+//! module's header is its manual, and `diaphane techniques NAME` prints it.
+
+mod filtered_normals;
+mod local;
+mod opaque;
+
+use crate::frame::Surface;
+use crate::gpu::Images;
+use crate::problem::Problem;
+use crate::scene::{Material, TechniqueText};
+use crate::store::{Plan, Slot};
+
+/// Radiance per pixel, `rgba32float`, at the sampled size.
+pub type Scattered = Slot<Images>;
+
+/// A way of making scattered light, with its settings.
+pub trait Technique: Send + Sync {
+    /// The steps for all of the surface's objects.
+    fn plan(&self, plan: &mut Plan, surface: &Surface) -> Result<Scattered, Problem>;
+
+    /// How far above the surface of such a material shadows are to be looked up, mm: the distance over which this
+    /// technique lets light in around an edge. 0 for one that knows nothing of its neighbourhood.
+    fn entry_mm(&self, _material: &Material) -> f64 {
+        0.0
+    }
+
+    /// What a material asks for that this technique cannot do, before anything is planned. `path` leads to the field in
+    /// the material's file.
+    fn refuses(&self, _material: &Material) -> Option<Problem> {
+        None
+    }
+}
+
+/// One line of the registry.
+pub struct Entry {
+    pub name: &'static str,
+    /// The header of its module.
+    pub manual: &'static str,
+    pub read: fn(&TechniqueText) -> Result<Box<dyn Technique>, Problem>,
+}
+
+macro_rules! entry {
+    ($module:ident, $type:ident) => {
+        Entry {
+            name: stringify!($type),
+            manual: include_str!(concat!(stringify!($module), "/mod.rs")),
+            read: |text| Ok(Box::new(text.settings::<$module::$type>()?)),
+        }
+    };
+}
+
+/// Every technique there is.
+pub const REGISTRY: &[Entry] = &[entry!(opaque, Opaque), entry!(filtered_normals, FilteredNormals)];
+
+/// The technique that a scene or a flag names, with its settings read.
+pub fn read(text: &TechniqueText) -> Result<Box<dyn Technique>, Problem> {
+    match REGISTRY.iter().find(|entry| entry.name == text.name) {
+        Some(entry) => (entry.read)(text),
+        None => Err(text.unknown(&REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>())),
+    }
+}
+
+impl Entry {
+    /// The manual as text: the module's header without its comment marks.
+    pub fn manual_text(&self) -> String {
+        let header = self.manual.lines().take_while(|line| line.starts_with("//!"));
+        header.map(|line| line.trim_start_matches("//!").strip_prefix(' ').unwrap_or("").to_string() + "\n").collect()
+    }
+
+    /// The manual's first line.
+    pub fn summary(&self) -> String {
+        self.manual_text().lines().next().unwrap_or_default().to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_technique_has_a_manual_and_reads_without_settings() {
+        for entry in REGISTRY {
+            assert!(entry.manual_text().lines().count() > 10, "{} has no manual", entry.name);
+            let text = TechniqueText::from_flag("--technique", &format!("{}()", entry.name)).unwrap();
+            assert!(read(&text).is_ok());
+            let text = TechniqueText::from_flag("--technique", &format!("{}(oops: 1)", entry.name)).unwrap();
+            assert!(read(&text).err().unwrap().what.contains("oops"));
+        }
+    }
+
+    #[test]
+    fn a_name_that_is_not_there_brings_the_nearest_one() {
+        let text = TechniqueText::from_flag("--technique", "FilterdNormals()").unwrap();
+        assert!(read(&text).err().unwrap().hint.unwrap().contains("FilteredNormals"));
+    }
+}
