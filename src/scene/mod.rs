@@ -22,6 +22,10 @@ mod technique;
 mod tree;
 mod warn;
 
+#[cfg(test)]
+#[path = "tests.rs"]
+mod room_tests;
+
 pub use document::Kind;
 pub use fields::Triple;
 pub use material::{Layer, Material, Surface, TextureMap, Varying};
