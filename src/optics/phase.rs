@@ -1,0 +1,127 @@
+//! Phase functions: the share of scattered light per steradian, 1/sr, by the angle between two directions.
+//!
+//! `cos` is the cosine between omega_i and omega_o, which *both point away* from where light scatters: light that goes
+//! straight on has cos = -1. Every function is 1 when integrated over the sphere, and is forward for a positive parameter.
+
+use crate::optics::root::bracketed_root;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+
+/// Which phase function a medium has. A [`Medium`](crate::optics::medium::Medium) knows its mean cosine g whatever the
+/// function; [`Phase::parameter`] turns it into the function's own parameter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Phase {
+    /// Its parameter is the mean cosine itself.
+    #[default]
+    HenyeyGreenstein,
+    /// Its parameter is the k of [Francois2006].
+    Schlick,
+}
+
+impl Phase {
+    /// 1/sr, for the function's own `parameter` in (-1, 1).
+    pub fn value(self, cos: f64, parameter: f64) -> f64 {
+        match self {
+            Phase::HenyeyGreenstein => henyey_greenstein(cos, parameter),
+            Phase::Schlick => schlick(cos, parameter),
+        }
+    }
+
+    /// The mean cosine g between the directions in which light travels before and after.
+    pub fn mean_cosine(self, parameter: f64) -> f64 {
+        match self {
+            Phase::HenyeyGreenstein => parameter,
+            Phase::Schlick => schlick_mean_cosine(parameter),
+        }
+    }
+
+    /// The inverse of [`Phase::mean_cosine`], for g in (-1, 1).
+    pub fn parameter(self, mean_cosine: f64) -> f64 {
+        match self {
+            Phase::HenyeyGreenstein => mean_cosine,
+            Phase::Schlick => schlick_parameter(mean_cosine),
+        }
+    }
+}
+
+/// Scattering that has no preferred direction, 1/(4 pi).
+pub fn isotropic() -> f64 {
+    0.25 / PI
+}
+
+/// Henyey and Greenstein's function for the mean cosine `g` in (-1, 1).
+pub fn henyey_greenstein(cos: f64, g: f64) -> f64 {
+    let q = 1.0 + g * g + 2.0 * g * cos;
+    0.25 / PI * (1.0 - g * g) / (q * q.sqrt())
+}
+
+/// Schlick's function for `k` in (-1, 1), as [Francois2006] prints it. k is not the mean cosine.
+pub fn schlick(cos: f64, k: f64) -> f64 {
+    let q = 1.0 + k * cos;
+    0.25 / PI * (1.0 - k * k) / (q * q)
+}
+
+/// The mean cosine of [`schlick`]: 1/k - (1 - k²)/k² artanh(k), which is 2k/3 for small k.
+pub fn schlick_mean_cosine(k: f64) -> f64 {
+    if k.abs() < 0.1 {
+        // The two terms cancel: sum 2 k^(2n-1) / ((2n-1)(2n+1)) instead.
+        let q = k * k;
+        return 2.0
+            * k
+            * (1.0 / 3.0
+                + q * (1.0 / 15.0
+                    + q * (1.0 / 35.0 + q * (1.0 / 63.0 + q * (1.0 / 99.0 + q * (1.0 / 143.0 + q / 195.0))))));
+    }
+    1.0 / k - (1.0 - k * k) / (k * k) * k.atanh()
+}
+
+/// The k whose [`schlick_mean_cosine`] is `g` in (-1, 1).
+pub fn schlick_parameter(g: f64) -> f64 {
+    // Odd in g, and k lies between g and 3g/2.
+    let k = bracketed_root(|k| schlick_mean_cosine(k) - g.abs(), g.abs(), (1.5 * g.abs()).min(1.0 - f64::EPSILON));
+    k.copysign(g)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::optics::quadrature::{gauss_legendre, integrate};
+    use proptest::prelude::*;
+
+    #[test]
+    fn the_papers_k_of_a_fishs_organs() {
+        assert!((schlick_mean_cosine(0.8) - 0.632).abs() < 5e-4);
+        assert!((schlick_mean_cosine(0.1 - 1e-12) - schlick_mean_cosine(0.1)).abs() < 1e-11);
+    }
+
+    #[test]
+    fn antiderivatives_say_that_nothing_is_lost() {
+        // 2 pi times the antiderivative in cos, from -1 to 1.
+        for g in [-0.9, -0.3, 0.25, 0.8, 0.99f64] {
+            let hg = |c: f64| -0.5 * (1.0 - g * g) / (g * (1.0 + g * g + 2.0 * g * c).sqrt());
+            let schlick_total = |c: f64| -0.5 * (1.0 - g * g) / (g * (1.0 + g * c));
+            assert!((hg(1.0) - hg(-1.0) - 1.0).abs() < 1e-12);
+            assert!((schlick_total(1.0) - schlick_total(-1.0) - 1.0).abs() < 1e-12);
+            for c in [-0.7, 0.0, 0.4] {
+                let slope = |f: &dyn Fn(f64) -> f64| (f(c + 1e-5) - f(c - 1e-5)) / 2e-5;
+                assert!((slope(&hg) - 2.0 * PI * henyey_greenstein(c, g)).abs() < 1e-6);
+                assert!((slope(&schlick_total) - 2.0 * PI * schlick(c, g)).abs() < 1e-6);
+            }
+        }
+        assert_eq!((henyey_greenstein(0.3, 0.0), schlick(0.3, 0.0)), (isotropic(), isotropic()));
+    }
+
+    proptest! {
+        #[test]
+        fn normal_forward_and_of_the_stated_mean_cosine(parameter in -0.9..0.9f64) {
+            let rule = gauss_legendre(200, -1.0, 1.0);
+            for phase in [Phase::HenyeyGreenstein, Phase::Schlick] {
+                let moment = |n| 2.0 * PI * integrate(&rule, |cos| (-cos).powi(n) * phase.value(cos, parameter));
+                prop_assert!((moment(0) - 1.0).abs() < 1e-9);
+                prop_assert!((moment(1) - phase.mean_cosine(parameter)).abs() < 1e-9);
+                prop_assert!((phase.value(-1.0, parameter) - phase.value(1.0, parameter)) * parameter >= 0.0);
+                prop_assert!((phase.parameter(phase.mean_cosine(parameter)) - parameter).abs() < 1e-12);
+            }
+        }
+    }
+}
