@@ -1,0 +1,334 @@
+//! From the bytes of a file to a checked tree: encoding, syntax, version, `base:`, `--set`, then the schema.
+//!
+//! These stop at the first error, since what follows it would be guesswork. Meaning comes later, all at once, in
+//! [`super::meaning`].
+
+use crate::problem::{Problem, nearest};
+use crate::scene::de::{self, suggest};
+use crate::scene::path::join;
+use crate::scene::tree::{Field, Node, Source, SyntaxError, Value, shown};
+use crate::store::{File, Files};
+use ron::extensions::Extensions;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Scenes and materials are written by hand; more than this is a mistake.
+const MAX_BYTES: usize = 64 << 20;
+/// The versions of the format that this program reads.
+const VERSIONS: [u32; 1] = [1];
+/// Structs that may be written with their name; any other name is a variant of an enum.
+const STRUCTS: [&str; 2] = ["Material", "Surface"];
+
+impl SyntaxError {
+    pub fn problem(self, source: &Source) -> Problem {
+        let mut problem = Problem::files(self.what).at(source.at(self.span));
+        problem.hint = self.hint;
+        problem
+    }
+}
+
+/// RON as these files use it.
+pub fn ron() -> ron::Options {
+    ron::Options::default()
+        .with_default_extension(Extensions::IMPLICIT_SOME | Extensions::UNWRAP_VARIANT_NEWTYPES)
+        .with_recursion_limit(128)
+}
+
+/// The tree of a text, which must be RON.
+pub fn parse(source: &Arc<Source>) -> Result<Node, Problem> {
+    let tree = Node::parse(source, 0).map_err(|e| e.problem(source))?;
+    // ron has the last word, and its position is where it stopped.
+    ron().from_str::<serde::de::IgnoredAny>(&source.text).map_err(|e| {
+        let line = source.text.split_inclusive('\n').take(e.span.start.line - 1).map(str::len).sum::<usize>();
+        let column = source.text[line..].chars().take(e.span.start.col - 1).map(char::len_utf8).sum::<usize>();
+        Problem::files(format!("this is not RON: {}", e.code)).at(source.at(line + column..line + column + 1))
+    })?;
+    Ok(tree)
+}
+
+/// The text of a file that was read.
+pub fn text(file: &File) -> Result<Arc<Source>, Problem> {
+    let whole = |what: String| Problem::files(what).at(crate::problem::At::file(&shown(&file.path)));
+    if file.bytes.len() > MAX_BYTES {
+        let what = format!("the file has {} bytes, more than the {MAX_BYTES} that are read", file.bytes.len());
+        return Err(whole(what).hint("is this a scene or a material?"));
+    }
+    match std::str::from_utf8(&file.bytes) {
+        Ok(text) => Ok(Source::of_file(&file.path, text.strip_prefix('\u{feff}').unwrap_or(text).to_string())),
+        Err(_) => Err(whole("the file is not UTF-8 text".into()).hint("is this a scene or a material?")),
+    }
+}
+
+/// A file that nothing names but the user.
+pub fn read(files: &Files, path: &Path) -> Result<File, Problem> {
+    files.read(path).map_err(|e| unreadable(path, &e))
+}
+
+pub fn open(files: &Files, path: &Path) -> Result<Node, Problem> {
+    parse(&text(&read(files, path)?)?)
+}
+
+/// What a file is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    Scene,
+    Material,
+}
+
+impl Kind {
+    pub fn word(self) -> &'static str {
+        match self {
+            Kind::Scene => "Scene",
+            Kind::Material => "Material",
+        }
+    }
+    /// By its name, or by fields that only one of the two has.
+    pub fn of(root: &Node) -> Option<Kind> {
+        let has = |names: &[&str]| names.iter().any(|n| root.field(n).is_some());
+        match root.name() {
+            Some("Scene") => Some(Kind::Scene),
+            Some("Material") => Some(Kind::Material),
+            Some(_) => None,
+            None if has(&["mm_per_unit", "objects", "camera", "lights"]) => Some(Kind::Scene),
+            None if has(&["medium", "surface", "base", "layers", "filter"]) => Some(Kind::Material),
+            None => None,
+        }
+    }
+}
+
+/// That the root is a struct of this kind and of a version that is read.
+pub fn check_head(root: &Node, kind: Kind) -> Result<(), Problem> {
+    let word = kind.word();
+    let head = || root.source.at(root.span.start..root.span.start + root.name().map_or(1, str::len));
+    if let Some(name) = root.name().filter(|n| *n != word) {
+        let hint = match Kind::of(root) {
+            Some(other) => format!("name a file that holds a {word}( ), not a {}", other.word()),
+            None => format!("write {word}( )"),
+        };
+        return Err(Problem::files(format!("expected {word}( ), found `{name}`")).at(head()).hint(hint));
+    }
+    let Some(fields) = root.fields() else {
+        return Err(Problem::files(format!("expected {word}( )")).at(root.at()).hint(format!("{word}(version: 1, …)")));
+    };
+    let read = VERSIONS.map(|v| v.to_string()).join(", ");
+    let Some(version) = fields.iter().find(|f| f.name == "version") else {
+        let hint = format!("begin with {word}(version: 1, …); this program reads version {read}");
+        return Err(Problem::files("the field `version` is missing").at(root.at()).hint(hint));
+    };
+    match version.value.value {
+        Value::Number(n) if VERSIONS.iter().any(|v| f64::from(*v) == n) => Ok(()),
+        _ => Err(Problem::files(format!("version {} is not one that this program reads", version.value.text()))
+            .at(version.value.at())
+            .path("version")
+            .hint(format!("this program reads version {read}; a newer one may read this file"))),
+    }
+}
+
+/// Reads a typed value and says where it failed. `path` is where `node` stands in its file.
+pub fn typed<T: serde::de::DeserializeOwned>(node: &Node, path: &str) -> Result<T, Problem> {
+    de::from_node(node).map_err(|e| e.problem(node, path))
+}
+
+/// Where a path that stands in `node` leads.
+pub fn resolve(node: &Node, path: &str) -> PathBuf {
+    node.source.dir.join(path)
+}
+
+/// Reads the file that `node`, a text, names.
+pub fn named(files: &Files, node: &Node, path: &str) -> Result<File, Problem> {
+    let full = resolve(node, path);
+    files.read(&full).map_err(|e| unreadable(&full, &e).at(node.at()))
+}
+
+/// What to say of a file that cannot be read: why, where it was looked for, and what is there.
+fn unreadable(path: &Path, error: &std::io::Error) -> Problem {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let file = path.file_name().unwrap_or_default().to_string_lossy();
+    let why = match error.kind() {
+        std::io::ErrorKind::NotFound => "there is no such file".to_string(),
+        std::io::ErrorKind::IsADirectory => "it is a folder".to_string(),
+        _ => error.to_string(),
+    };
+    let mut there: Vec<String> = std::fs::read_dir(folder)
+        .map(|all| all.flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect())
+        .unwrap_or_default();
+    there.sort();
+    let looked = format!("looked in {}", shown(folder).display());
+    let hint = match nearest(&file, there.iter().map(String::as_str)) {
+        Some(right) if right != file => format!("{looked}; did you mean `{right}`?"),
+        _ if path.components().any(|c| c.as_os_str() == "models") => {
+            format!("{looked}; tools/fetch-models brings the models")
+        }
+        _ if !folder.is_dir() => {
+            format!("{looked}, which is not there; paths are relative to the file that names them")
+        }
+        _ => format!("{looked}; paths are relative to the file that names them"),
+    };
+    Problem::files(format!("cannot read `{}`: {why}", shown(path).display()))
+        .at(crate::problem::At::file(&shown(path)))
+        .hint(hint)
+}
+
+/// A material file with all that it inherits, each value with the place that it came from.
+///
+/// `fits` is asked about every file of the chain by itself, so that what is wrong in a base is found where it stands even
+/// when it is overridden.
+pub fn material(files: &Files, file: &File, fits: &dyn Fn(&Node) -> Result<(), Problem>) -> Result<Node, Problem> {
+    let mut chain = vec![file.path.clone()];
+    let mut tree = head_of(file, fits)?;
+    while let Some(base) = tree.field("base").filter(|n| n.name() != Some("None")).cloned() {
+        let name = match &base.value {
+            Value::Text(name) => name.clone(),
+            _ => typed::<String>(&base, "base")?,
+        };
+        let next = named(files, &base, &name).map_err(|e| e.path("base"))?;
+        let same = |path: &PathBuf| shown(path) == shown(&next.path);
+        if chain.iter().any(same) {
+            chain.push(next.path.clone());
+            let shown: Vec<String> = chain.iter().map(|p| shown(p).display().to_string()).collect();
+            return Err(Problem::files("a material cannot inherit from itself")
+                .at(base.at())
+                .path("base")
+                .hint(format!("break the circle {}", shown.join(" -> "))));
+        }
+        chain.push(next.path.clone());
+        // The base's own `base` leads on; the one that was just followed is done with.
+        let mut under = head_of(&next, fits)?;
+        if let Value::Struct(_, fields) = &mut tree.value {
+            fields.retain(|f| f.name != "base");
+        }
+        merge(&mut under, tree);
+        tree = under;
+    }
+    if let Value::Struct(_, fields) = &mut tree.value {
+        fields.retain(|f| f.name != "base");
+    }
+    Ok(tree)
+}
+
+fn head_of(file: &File, fits: &dyn Fn(&Node) -> Result<(), Problem>) -> Result<Node, Problem> {
+    let tree = parse(&text(file)?)?;
+    check_head(&tree, Kind::Material)?;
+    fits(&tree)?;
+    Ok(tree)
+}
+
+/// Structs merge; lists, enum variants and single values replace whole. The place of a merged struct is `over`'s.
+fn merge(under: &mut Node, over: Node) {
+    let plain =
+        |node: &Node| node.name().is_none_or(|n| STRUCTS.contains(&n)) && matches!(node.value, Value::Struct(..));
+    if !(plain(under) && plain(&over)) {
+        *under = over;
+        return;
+    }
+    let (source, span) = (over.source.clone(), over.span.clone());
+    let (Value::Struct(_, old), Value::Struct(_, new)) = (&mut under.value, over.value) else { unreachable!() };
+    for Field { name, source, name_span, value } in new {
+        match old.iter_mut().find(|f| f.name == name) {
+            Some(field) => {
+                merge(&mut field.value, value);
+                (field.source, field.name_span) = (source, name_span);
+            }
+            None => old.push(Field { name, source, name_span, value }),
+        }
+    }
+    (under.source, under.span) = (source, span);
+}
+
+/// Makes the texts of `image:` fields, inherited from other folders, relative to the file `path`.
+pub fn rebase(root: &mut Node, path: &Path) {
+    fn each(node: &mut Node, home: &Path) {
+        match &mut node.value {
+            Value::Struct(_, fields) => {
+                for field in fields {
+                    let dir = field.value.source.dir.clone();
+                    if let (Value::Text(text), "image") = (&mut field.value.value, field.name.as_str()) {
+                        // A base's folder begins with the one that named it, so what follows leads there.
+                        let full = dir.join(&*text);
+                        *text = full.strip_prefix(home).unwrap_or(&full).to_string_lossy().into_owned();
+                    }
+                    each(&mut field.value, home);
+                }
+            }
+            Value::List(items) | Value::Tuple(_, items) => items.iter_mut().for_each(|item| each(item, home)),
+            _ => {}
+        }
+    }
+    each(root, path.parent().unwrap_or(Path::new("")));
+}
+
+/// What is wrong with what the files mean: found all at once, each thing at its place.
+pub struct Judge<'a> {
+    pub root: &'a Node,
+    pub problems: Vec<Problem>,
+}
+
+impl<'a> Judge<'a> {
+    /// Numbers that are none are found at once, wherever they are.
+    pub fn new(root: &'a Node) -> Judge<'a> {
+        let mut judge = Judge { root, problems: Vec::new() };
+        root.walk("", &mut |path, node| {
+            if let Value::Number(n) = node.value
+                && !n.is_finite()
+            {
+                judge.problems.push(
+                    Problem::files(format!("{} is not a finite number", node.text()))
+                        .at(node.at())
+                        .path(path)
+                        .hint("write a number"),
+                );
+            }
+        });
+        judge
+    }
+    pub fn node(&self, path: &str) -> &'a Node {
+        self.root.nearest(path)
+    }
+    /// The value as it was written, or `the default` where it was not.
+    pub fn written(&self, path: &str) -> String {
+        let text = self.root.get(path).map_or("the default", |node| node.text());
+        if text.chars().count() > 40 || text.contains('\n') { "this".to_string() } else { text.to_string() }
+    }
+    pub fn wrong(&mut self, path: &str, what: impl Into<String>, hint: impl Into<String>) {
+        self.problems.push(Problem::files(what).at(self.node(path).at()).path(path).hint(hint));
+    }
+    pub fn warn(&mut self, path: &str, what: impl Into<String>, hint: impl Into<String>) {
+        self.problems.push(Problem::warning(what).at(self.node(path).at()).path(path).hint(hint));
+    }
+    /// What was found elsewhere, on behalf of the value at `path`.
+    pub fn found(&mut self, path: &str, problem: Problem) {
+        self.problems.push(Problem { path: Some(path.to_string()), ..problem });
+    }
+
+    /// That each of `values` is `allowed`; what is not finite was said already.
+    pub fn all(&mut self, path: &str, values: &[f64], allowed: impl Fn(f64) -> bool, range: &str) {
+        if values.iter().all(|v| v.is_finite()) && !values.iter().all(|v| allowed(*v)) {
+            // One number of several is marked by itself where it is written by itself.
+            let member = values.iter().position(|v| !allowed(*v)).map(|i| format!("{path}.{i}"));
+            let place = match member.filter(|m| values.len() > 1 && self.root.get(m).is_some()) {
+                Some(member) => member,
+                None => path.to_string(),
+            };
+            let node = self.node(&place);
+            let what = format!("{} is not allowed", self.written(&place));
+            self.problems.push(Problem::files(what).at(node.at()).path(path).hint(range));
+        }
+    }
+    /// That a name is not empty and not among `seen`.
+    pub fn name(&mut self, path: &str, name: &str, seen: &mut Vec<String>) {
+        if name.trim().is_empty() {
+            self.wrong(&join(path, "name"), "a name cannot be empty", "give it a name: messages and --set use it");
+        } else if seen.iter().any(|s| s == name) {
+            self.wrong(&join(path, "name"), format!("`{name}` is the name of another one too"), "choose another name");
+        }
+        seen.push(name.to_string());
+    }
+    /// That `word` is one of `known`.
+    pub fn known(&mut self, path: &str, word: &str, what: &str, known: &[&str]) -> bool {
+        let ok = known.contains(&word);
+        if !ok {
+            self.wrong(path, format!("there is no {what} `{word}`"), suggest(word, known.iter().copied()));
+        }
+        ok
+    }
+}
