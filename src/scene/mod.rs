@@ -33,7 +33,8 @@ pub use material_file::{
     BoxKernel, Curve, Diffusion, Exponential, Filter, FromMedium, Gaussian, Length, Neighbours, Normalized, Phase,
     Profile, Weights,
 };
-pub use medium::{Medium, MediumSpec, Substance};
+pub use crate::optics::medium::Medium;
+pub use medium::{MediumSpec, Substance};
 pub use outside::{Channel, Encoding, Mesh, Texture, Tone};
 pub use reader::Reader;
 pub use technique::TechniqueText;
