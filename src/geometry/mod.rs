@@ -3,7 +3,10 @@
 //! Long computations take a [`Tick`](crate::problem::Tick), use every core, and give the same bits on any number of
 //! them: threads share the work by items, and every sum runs in a fixed order.
 
+pub mod bvh;
+pub mod deform;
 pub mod mesh;
 pub mod neighbours;
 pub mod normals;
 pub mod shapes;
+pub mod visibility;
