@@ -1,1 +1,12 @@
+//! Meshes and what can be computed on them. Pure functions: nothing here knows of scenes, the store or GPUs.
+//!
+//! Long computations take a [`Tick`](crate::problem::Tick), use every core, and give the same bits on any number of
+//! them: threads share the work by items, and every sum runs in a fixed order.
 
+pub mod bvh;
+pub mod deform;
+pub mod mesh;
+pub mod neighbours;
+pub mod normals;
+pub mod shapes;
+pub mod visibility;
