@@ -84,7 +84,9 @@ impl Session {
         let (plan, picture) = render::plan(scene, look, &self.shaders)?;
         let image = self.get(&plan, picture, watch)?;
         if let Some(bad) = image.non_finite() {
-            return Err(Problem::new(Cause::Unfinished, format!("the picture has a value that is no number: {bad}"))
+            let (x, y) = bad.first;
+            let what = format!("{} pixel(s) of the picture hold no number, the first at {x}, {y}", bad.count);
+            return Err(Problem::new(Cause::Unfinished, what)
                 .hint("this is a mistake in the program or in a shader that was edited; nothing was written"));
         }
         Ok((plan, image))

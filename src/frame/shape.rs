@@ -3,7 +3,9 @@
 //! Re-runs when: a shape's parameters, its normals, its scale, or (for what deforms) the time change. Moving and turning an
 //! object re-runs nothing here.
 
-use crate::geometry::{deform, mesh::Bounds, mesh::Mesh, normals, sculpture, shapes};
+use crate::geometry::deform::Twist;
+use crate::geometry::mesh::{Bounds, Mesh};
+use crate::geometry::{normals, sculpture, shapes};
 use crate::gpu::{Buffer, Gpu};
 use crate::problem::Problem;
 use crate::scene::{self, Deform, MeshSource, Normals, Object};
@@ -103,7 +105,7 @@ impl Step for Worn {
         });
         for deform in &self.deform {
             let Deform::Twist { axis, deg_per_unit, speed_hz } = *deform;
-            mesh = deform::twist(&mesh, axis, deg_per_unit, speed_hz, self.time_s);
+            mesh = Twist { axis, deg_per_unit, speed_hz }.apply(&mesh, self.time_s);
         }
         Ok(match self.scale == DVec3::ONE {
             true => mesh,

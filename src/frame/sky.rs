@@ -53,7 +53,7 @@ impl Step for SkyVisibility {
         let meshes: Vec<_> = self.occluders.iter().map(|(mesh, at)| (run.get(*mesh), *at)).collect();
         let bvh = Bvh::new(&meshes.iter().map(|(mesh, at)| (mesh.as_ref(), *at)).collect::<Vec<_>>());
         let mesh = run.get(self.mesh).transformed(&self.world_from_object);
-        visibility(&mesh, &bvh, DIRECTIONS, &|share| run.tick(share))
+        visibility(&mesh.positions, &mesh.normals, &bvh, DIRECTIONS, &|share| run.tick(share))
     }
 }
 
@@ -78,7 +78,7 @@ impl Step for SkyCells {
     }
     fn run(&self, run: &Run) -> Result<Vec<Vec3>, Problem> {
         let image = run.get(self.image);
-        let centres: Vec<Vec3> = directions(DIRECTIONS);
+        let centres: Vec<Vec3> = directions(DIRECTIONS).iter().map(|d| d.as_vec3()).collect();
         let rows: Vec<Vec<(DVec3, f64)>> = (0..image.height)
             .into_par_iter()
             .map(|y| {
@@ -154,7 +154,7 @@ impl Step for SkyLight {
             .enumerate()
             .map(|(k, direction)| {
                 let cell = cells.as_ref().map_or(DVec3::ONE, |cells| cells[k].as_dvec3());
-                tables::Direction { direction, light: (solid_angle * cell * self.radiance).as_vec3() }
+                tables::Direction { direction: direction.as_vec3(), light: (solid_angle * cell * self.radiance).as_vec3() }
             })
             .collect();
         let mut bytes = encase::StorageBuffer::new(Vec::new());
@@ -465,15 +465,17 @@ impl Frame<'_> {
     pub(super) fn openness(&self, plan: &mut Plan, item: &Item) -> Result<Option<Slot<Buffer>>, Problem> {
         let Some(surroundings) = self.surroundings(plan) else { return Ok(None) };
         let Some(visible) = self.sky_visibility(plan, item, &surroundings) else { return Ok(None) };
+        let over = shape::upload(plan, item.mesh, shape::Stream::Positions);
+        let light = self.sky_light(plan, &surroundings);
         Ok(Some(plan.add(Compute {
             name: "frame.openness",
             about: format!("how open the sky is from each vertex of `{}`", item.name),
             shader: self.shaders.load("frame/openness.wgsl", &[])?,
             output: ("openness", 16),
-            over: shape::upload(plan, item.mesh, shape::Stream::Positions),
+            over,
             over_stride: 12,
             binds: vec![
-                ("directions", Bind::Buffer(self.sky_light(plan, &surroundings))),
+                ("directions", Bind::Buffer(light)),
                 ("visible", Bind::Buffer(visible)),
             ],
         })))

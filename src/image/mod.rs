@@ -73,7 +73,7 @@ fn position(width: u32, index: usize) -> (u32, u32) {
 }
 
 /// What the integers of a PNG or JPEG stand for. Alpha is linear always.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Encoding {
     Srgb,
     Linear,

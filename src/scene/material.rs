@@ -3,7 +3,8 @@
 use crate::problem::Problem;
 use crate::scene::document::Judge;
 use crate::scene::fields::{Spec, TextureSpec, Triple};
-use crate::scene::material_file::{Curve, Filter, LayerSpec, MaterialFile, Phase, Profile};
+use crate::optics::phase::Phase;
+use crate::scene::material_file::{Curve, Filter, LayerSpec, MaterialFile, Profile};
 use crate::optics::medium::Medium;
 use crate::scene::medium::{MediumSpec, Substance};
 use crate::scene::outside::{Channel, Encoding, Texture};
@@ -20,6 +21,9 @@ use std::sync::Arc;
 pub struct Material {
     pub surface: Surface,
     pub medium: Substance,
+    /// Of the light that enters at normal incidence, the share that leaves again: that of the medium under its boundary,
+    /// or of the paint.
+    pub albedo: DVec3,
     /// How the file spelled the medium.
     pub spelled: MediumSpec,
     pub phase: Phase,
@@ -110,13 +114,18 @@ pub fn build(file: &MaterialFile, reader: &Reader, judge: &mut Judge<'_>) -> Mat
         }
     };
     let layers = layers(file, reader, judge);
+    let substance = medium.resolve(ior, file.phase);
     Material {
         surface: Surface {
             ior,
             roughness: roughness.unwrap_or(Varying::Constant(0.0)),
             color: color.unwrap_or(Varying::Constant(DVec3::ONE)),
         },
-        medium: medium.resolve(ior),
+        albedo: match &substance {
+            Substance::Translucent(medium) => medium.multiple_scattering_albedo(ior),
+            Substance::Opaque { albedo } => *albedo,
+        },
+        medium: substance,
         spelled: medium.clone(),
         phase: file.phase,
         profile: file.profile,
@@ -152,7 +161,7 @@ fn layers(file: &MaterialFile, reader: &Reader, judge: &mut Judge<'_>) -> Vec<La
         judge.name(&path, &name, &mut names);
         let medium_path = join(&path, "medium");
         medium.check(judge, &medium_path);
-        let substance = medium.resolve(file.surface.ior.unwrap_or(1.3));
+        let substance = medium.resolve(file.surface.ior.unwrap_or(1.3), layer.phase.unwrap_or(file.phase));
         if medium.is_opaque() {
             judge.wrong(
                 &medium_path,

@@ -36,7 +36,7 @@ use crate::geometry::neighbours::{self, Kernel};
 use crate::problem::Problem;
 use crate::scene::{Filter, Length, Material, Neighbours, Substance, Weights};
 use crate::store::{Bake, Plan, Run, Slot, Step};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 /// It has no settings of its own: the kernel is the material's.
@@ -61,6 +61,8 @@ fn kernel(material: &Material) -> Option<(Kernel, neighbours::Length)> {
     match &material.filter {
         Filter::Neighbours(kernel) => {
             let Neighbours { sigma_tr, radius, alpha, weights: w, length: l } = *kernel;
+            // One normal serves all channels.
+            let sigma_tr = DVec3::from(sigma_tr.0).element_sum() / 3.0;
             Some((Kernel { sigma_tr, radius, alpha, weights: weights(w) }, length(l)))
         }
         Filter::FromMedium(kernel) => {
@@ -131,7 +133,9 @@ impl Step for NeighbourNormals {
     }
     fn run(&self, run: &Run) -> Result<Vec<Vec3>, Problem> {
         let mesh = run.get(self.mesh);
-        neighbours::filter_normals(&mesh, self.mm_per_unit, &self.kernel, self.length, &|share| run.tick(share))
+        let tick = |share| run.tick(share);
+        let normals = neighbours::filter_normals(&mesh, self.mm_per_unit, &self.kernel, self.length, &tick)?;
+        Ok(normals.iter().map(|normal| normal.as_vec3()).collect())
     }
 }
 
