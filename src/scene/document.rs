@@ -153,9 +153,15 @@ fn unreadable(path: &Path, error: &std::io::Error) -> Problem {
         .map(|all| all.flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect())
         .unwrap_or_default();
     there.sort();
+    // What all names share, the extension, says nothing of which is meant.
+    let stem = |name: &str| Path::new(name).with_extension("").to_string_lossy().into_owned();
+    let alike = |name: &String| Path::new(name).extension() == path.extension();
+    let stems: Vec<String> = there.iter().filter(|name| alike(name)).map(|name| stem(name)).collect();
+    let near = nearest(&stem(&file), stems.iter().map(String::as_str));
+    let near = there.iter().find(|name| alike(name) && Some(stem(name).as_str()) == near);
     let looked = format!("looked in {}", shown(folder).display());
-    let hint = match nearest(&file, there.iter().map(String::as_str)) {
-        Some(right) if right != file => format!("{looked}; did you mean `{right}`?"),
+    let hint = match near {
+        Some(right) if *right != file => format!("{looked}; did you mean `{right}`?"),
         _ if path.components().any(|c| c.as_os_str() == "models") => {
             format!("{looked}; tools/fetch-models brings the models")
         }
@@ -323,12 +329,12 @@ impl<'a> Judge<'a> {
         }
         seen.push(name.to_string());
     }
-    /// That `word` is one of `known`.
-    pub fn known(&mut self, path: &str, word: &str, what: &str, known: &[&str]) -> bool {
-        let ok = known.contains(&word);
-        if !ok {
-            self.wrong(path, format!("there is no {what} `{word}`"), suggest(word, known.iter().copied()));
+    /// That `word`, in the brackets of the value at `path`, is one of `known`.
+    pub fn known(&mut self, path: &str, word: &str, what: &str, known: &[&str]) {
+        if !known.contains(&word) {
+            let problem = Problem::files(format!("there is no {what} `{word}`"));
+            let at = self.node(&format!("{path}.0")).at();
+            self.problems.push(problem.at(at).path(path).hint(suggest(word, known.iter().copied())));
         }
-        ok
     }
 }

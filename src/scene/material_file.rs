@@ -1,5 +1,6 @@
 //! The schema of a material file, with its defaults. Lengths are millimetres, coefficients 1/mm.
 
+use crate::optics::phase::Phase;
 use crate::scene::fields::{Spec, Triple};
 use crate::scene::medium::MediumSpec;
 use serde::{Deserialize, Serialize};
@@ -12,7 +13,8 @@ pub struct MaterialFile {
     pub base: Option<String>,
     pub surface: SurfaceSpec,
     pub medium: MediumSpec,
-    pub phase: Phase,
+    /// The medium's own when it is left out.
+    pub phase: Option<Phase>,
     pub profile: Profile,
     pub filter: Filter,
     pub layers: Vec<LayerSpec>,
@@ -25,7 +27,7 @@ impl Default for MaterialFile {
             base: None,
             surface: SurfaceSpec::default(),
             medium: MediumSpec::Preset("marble".to_string()),
-            phase: Phase::default(),
+            phase: None,
             profile: Profile::default(),
             filter: Filter::default(),
             layers: Vec::new(),
@@ -64,15 +66,6 @@ impl Default for LayerSpec {
         let medium = MediumSpec::Preset("marble".to_string());
         LayerSpec { name: None, medium, phase: None, depth: Spec::Constant(1.0) }
     }
-}
-
-/// How light turns at a scattering event.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum Phase {
-    #[default]
-    HenyeyGreenstein,
-    /// g is taken as the function's k [Francois2006, section 3.5], which is not the mean cosine.
-    Schlick,
 }
 
 /// How far light that entered at one point leaves at others.

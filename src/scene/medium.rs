@@ -1,34 +1,13 @@
 //! The spellings of a medium in a file, and what each of them comes to.
 
+use crate::optics::Rgb;
+use crate::optics::medium::Medium;
+use crate::optics::phase::Phase;
+use crate::optics::presets::{Preset, preset, presets};
 use crate::scene::document::Judge;
 use crate::scene::fields::Triple;
 use crate::scene::path::join;
-use glam::DVec3;
 use serde::{Deserialize, Serialize};
-
-/// Absorption and scattering, 1/mm, and the anisotropy of scattering.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Medium {
-    pub sigma_a: DVec3,
-    pub sigma_s: DVec3,
-    pub g: f64,
-}
-
-impl Medium {
-    pub fn sigma_s_prime(&self) -> DVec3 {
-        self.sigma_s * (1.0 - self.g)
-    }
-    pub fn sigma_t_prime(&self) -> DVec3 {
-        self.sigma_a + self.sigma_s_prime()
-    }
-    pub fn albedo_prime(&self) -> DVec3 {
-        self.sigma_s_prime() / self.sigma_t_prime()
-    }
-    /// Classical: sqrt(3 sigma_a sigma_t').
-    pub fn sigma_tr(&self) -> DVec3 {
-        (3.0 * self.sigma_a * self.sigma_t_prime()).map(f64::sqrt)
-    }
-}
 
 /// What lies inside a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -36,7 +15,7 @@ pub enum Substance {
     Translucent(Medium),
     /// Lambertian: nothing gets in.
     Opaque {
-        albedo: DVec3,
+        albedo: Rgb,
     },
 }
 
@@ -109,7 +88,6 @@ const SHARE: &str = "from 0 to 1";
 impl MediumSpec {
     /// Every number within its range. `path` is where the medium stands.
     pub fn check(&self, judge: &mut Judge<'_>, path: &str) {
-        let before = judge.problems.len();
         let mut coefficients = |values: &[(&str, Triple)]| {
             for (name, value) in values {
                 judge.all(&join(path, name), &value.0, |v| v >= 0.0, AT_LEAST_0);
@@ -141,7 +119,7 @@ impl MediumSpec {
                 Some(("anisotropy", m.anisotropy))
             }
             MediumSpec::Preset(name) => {
-                let names: Vec<&str> = PRESETS.iter().map(|p| p.0).collect();
+                let names: Vec<&str> = presets().map(|p| p.name).collect();
                 judge.known(path, name, "preset", &names);
                 None
             }
@@ -153,67 +131,45 @@ impl MediumSpec {
         if let Some((name, g)) = g {
             judge.all(&join(path, name), &[g], |v| v.abs() < 1.0, "between -1 and 1, both excluded");
         }
-        if judge.problems.len() == before
-            && let Substance::Translucent(medium) = self.resolve(1.3)
-            && !(medium.sigma_a.is_finite() && medium.sigma_s.is_finite())
-        {
-            judge.wrong(path, "this medium is too dense to compute with", "a mean free path above 1e-300 mm");
-        }
     }
 
     pub fn is_opaque(&self) -> bool {
         matches!(self, MediumSpec::Opaque(_))
     }
 
+    fn preset(&self) -> Option<Preset> {
+        match self {
+            MediumSpec::Preset(name) => preset(name),
+            _ => None,
+        }
+    }
+
     /// The index of refraction of a surface that does not give one.
     pub fn default_ior(&self) -> f64 {
         match self {
             MediumSpec::Opaque(_) => 1.0,
-            MediumSpec::Preset(name) => PRESETS.iter().find(|p| p.0 == name).map_or(1.3, |p| p.1),
-            _ => 1.3,
+            _ => self.preset().map_or(1.3, |p| p.ior),
         }
     }
 
+    /// The phase function of a medium for which none is given.
+    pub fn default_phase(&self) -> Phase {
+        self.preset().map_or(Phase::default(), |p| p.phase)
+    }
+
     /// What the spelling comes to, under a surface of this index of refraction. Its numbers are within their ranges.
-    pub fn resolve(&self, _ior: f64) -> Substance {
-        let v = |t: Triple| DVec3::from(t.0);
-        let (sigma_a, sigma_s, g) = match self {
-            MediumSpec::ReducedCoefficients(m) => (v(m.sigma_a), v(m.sigma_s_prime), 0.0),
-            MediumSpec::Coefficients(m) => (v(m.sigma_a), v(m.sigma_s), m.g),
-            MediumSpec::Extinction(m) => (v(m.sigma_t) * (1.0 - v(m.albedo)), v(m.sigma_t) * v(m.albedo), m.g),
-            MediumSpec::AlbedoMfp(m) => ((1.0 - v(m.albedo)) / v(m.mfp), v(m.albedo) / v(m.mfp), m.g),
-            MediumSpec::Color(m) => {
-                // Van de Hulst's relation, index-matched [OpenPBR2024, section 3.7].
-                let single = v(m.color).map(|c| {
-                    let s = 4.09712 + 4.20863 * c - (9.59217 + 41.6808 * c + 17.7126 * c * c).sqrt();
-                    (1.0 - s * s) / (1.0 - m.anisotropy * s * s)
-                });
-                let sigma_t = 1.0 / (m.radius * v(m.radius_scale));
-                (sigma_t * (1.0 - single), sigma_t * single, m.anisotropy)
-            }
-            MediumSpec::Preset(name) => {
-                let [a, s] = PRESETS.iter().find(|p| p.0 == name).map_or([[0.0; 3]; 2], |p| [p.2, p.3]);
-                (DVec3::from(a), DVec3::from(s), 0.0)
-            }
-            MediumSpec::Opaque(m) => return Substance::Opaque { albedo: v(m.albedo) },
-        };
-        Substance::Translucent(Medium { sigma_a, sigma_s, g })
+    /// g is the phase function's own parameter; the medium's is the mean cosine that follows.
+    pub fn resolve(&self, ior: f64, phase: Phase) -> Substance {
+        let rgb = |t: Triple| Rgb::from(t.0);
+        let g = |parameter: f64| Rgb::splat(phase.mean_cosine(parameter));
+        Substance::Translucent(match self {
+            MediumSpec::ReducedCoefficients(m) => Medium::reduced_coefficients(rgb(m.sigma_a), rgb(m.sigma_s_prime)),
+            MediumSpec::Coefficients(m) => Medium::coefficients(rgb(m.sigma_a), rgb(m.sigma_s), g(m.g)),
+            MediumSpec::Extinction(m) => Medium::extinction(rgb(m.sigma_t), rgb(m.albedo), g(m.g)),
+            MediumSpec::AlbedoMfp(m) => Medium::albedo_mfp(rgb(m.albedo), rgb(m.mfp), g(m.g)),
+            MediumSpec::Color(m) => Medium::color(rgb(m.color), m.radius, rgb(m.radius_scale), g(m.anisotropy), ior),
+            MediumSpec::Preset(name) => preset(name).expect("unknown names were refused").medium,
+            MediumSpec::Opaque(m) => return Substance::Opaque { albedo: rgb(m.albedo) },
+        })
     }
 }
-
-/// Name, index of refraction, sigma_a, sigma_s' [Jensen2001].
-type Preset = (&'static str, f64, [f64; 3], [f64; 3]);
-const PRESETS: [Preset; 12] = [
-    ("apple", 1.3, [0.003, 0.0034, 0.046], [2.29, 2.39, 1.97]),
-    ("chicken1", 1.3, [0.015, 0.077, 0.19], [0.15, 0.21, 0.38]),
-    ("chicken2", 1.3, [0.018, 0.088, 0.2], [0.19, 0.25, 0.32]),
-    ("cream", 1.3, [0.0002, 0.0028, 0.0163], [7.38, 5.47, 3.15]),
-    ("ketchup", 1.3, [0.061, 0.97, 1.45], [0.18, 0.07, 0.03]),
-    ("marble", 1.5, [0.0021, 0.0041, 0.0071], [2.19, 2.62, 3.0]),
-    ("potato", 1.3, [0.0024, 0.009, 0.12], [0.68, 0.7, 0.55]),
-    ("skimmilk", 1.3, [0.0014, 0.0025, 0.0142], [0.7, 1.22, 1.9]),
-    ("skin1", 1.3, [0.032, 0.17, 0.48], [0.74, 0.88, 1.01]),
-    ("skin2", 1.3, [0.013, 0.07, 0.145], [1.09, 1.59, 1.79]),
-    ("spectralon", 1.3, [0.0, 0.0, 0.0], [11.6, 20.4, 14.9]),
-    ("wholemilk", 1.3, [0.0011, 0.0024, 0.014], [2.55, 3.21, 3.77]),
-];

@@ -30,10 +30,10 @@ pub use document::Kind;
 pub use fields::Triple;
 pub use material::{Layer, Material, Surface, TextureMap, Varying};
 pub use material_file::{
-    BoxKernel, Curve, Diffusion, Exponential, Filter, FromMedium, Gaussian, Length, Neighbours, Normalized, Phase,
-    Profile, Weights,
+    BoxKernel, Curve, Diffusion, Exponential, Filter, FromMedium, Gaussian, Length, Neighbours, Normalized, Profile,
+    Weights,
 };
-pub use medium::{Medium, MediumSpec, Substance};
+pub use medium::{MediumSpec, Substance};
 pub use outside::{Channel, Encoding, Mesh, Texture, Tone};
 pub use reader::Reader;
 pub use technique::TechniqueText;

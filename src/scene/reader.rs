@@ -119,11 +119,10 @@ impl Reader {
         let spelled: MaterialFile = typed(&root, "")?;
         let mut judge = Judge::new(&root);
         let material = build_material(&spelled, self, &mut judge);
-        if judge.problems.iter().any(Problem::is_error) {
-            return Ok((None, judge.problems));
+        if let Some(material) = &material {
+            warn::material(material, &mut judge);
         }
-        warn::material(&material, &mut judge);
-        Ok((Some(material), judge.problems))
+        Ok((material, judge.problems))
     }
 
     pub(super) fn default_material(&self) -> Arc<Material> {

@@ -6,6 +6,7 @@
 //! tolerant, since the ron crate has the last word on what is RON; it is bounded in depth and in the number of values.
 
 use crate::problem::At;
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -271,7 +272,8 @@ impl<'a> Parser<'a> {
     fn node(&mut self, start: usize, value: Value) -> Result<Node, SyntaxError> {
         self.nodes += 1;
         if self.nodes > MAX_NODES {
-            return Err(self.error(start..self.at, format!("the text holds more than {MAX_NODES} values")));
+            let what = format!("the text holds more than {MAX_NODES} values");
+            return Err(self.error(start..self.at, what).hint("put what is large into a mesh or an image"));
         }
         Ok(Node { source: self.source.clone(), span: start..self.at, value })
     }
@@ -280,16 +282,14 @@ impl<'a> Parser<'a> {
         self.blank()?;
         let start = self.at;
         if depth > MAX_DEPTH {
-            return Err(self.wrong(format!("brackets are nested more than {MAX_DEPTH} deep")));
+            return Err(self
+                .wrong(format!("brackets are nested more than {MAX_DEPTH} deep"))
+                .hint("close some before"));
         }
         let value = match self.peek() {
             Some('(') => self.parens(None, depth)?,
             Some('[') => Value::List(self.items('[', ']', |p| p.value(depth + 1))?),
-            Some('{') => Value::Map(self.items('{', '}', |p| {
-                let key = p.value(depth + 1)?;
-                p.colon("a key")?;
-                Ok((key, p.value(depth + 1)?))
-            })?),
+            Some('{') => self.map(depth)?,
             Some('"') => Value::Text(self.string()?),
             Some('\'') => self.char()?,
             Some('0'..='9' | '+' | '-' | '.') => self.number()?,
@@ -314,16 +314,33 @@ impl<'a> Parser<'a> {
                     }
                 }
             },
-            _ => return Err(self.wrong(format!("expected a value, {}", self.found()))),
+            _ => {
+                let hint = "a number, true or false, a \"text\", a [list], a {map}, a (struct) or a Name(…)";
+                return Err(self.wrong(format!("expected a value, {}", self.found())).hint(hint));
+            }
         };
         self.node(start, value)
+    }
+
+    fn map(&mut self, depth: usize) -> Result<Value, SyntaxError> {
+        let mut seen = BTreeSet::new();
+        let items = self.items('{', '}', |p| {
+            let key = p.value(depth + 1)?;
+            if !seen.insert(key.canonical()) {
+                let what = format!("{} is given twice", key.text());
+                return Err(p.error(key.span, what).hint("keep one of them"));
+            }
+            p.colon("a key")?;
+            Ok((key, p.value(depth + 1)?))
+        })?;
+        Ok(Value::Map(items))
     }
 
     fn colon(&mut self, after: &str) -> Result<(), SyntaxError> {
         self.blank()?;
         match self.eat(":") {
             true => Ok(()),
-            false => Err(self.wrong(format!("expected `:` after {after}, {}", self.found()))),
+            false => Err(self.wrong(format!("expected `:` after {after}, {}", self.found())).hint("name: value")),
         }
     }
 
@@ -351,7 +368,9 @@ impl<'a> Parser<'a> {
             items.push(item(self)?);
             self.blank()?;
             if !self.eat(",") && self.peek() != Some(close) && self.peek().is_some() {
-                return Err(self.wrong(format!("expected `,` or `{close}`, {}", self.found())));
+                return Err(self
+                    .wrong(format!("expected `,` or `{close}`, {}", self.found()))
+                    .hint("a comma stands between two values"));
             }
         }
     }
@@ -370,14 +389,14 @@ impl<'a> Parser<'a> {
         let all = self.items('(', ')', |p| {
             let at = p.at;
             let Some(name) = p.field_name() else {
-                return Err(p.wrong(format!("expected the name of a field, {}", p.found())));
+                return Err(p.wrong(format!("expected the name of a field, {}", p.found())).hint("name: value"));
             };
             let name_span = at..p.at;
             p.colon(&format!("`{name}`"))?;
             let value = p.value(depth + 1)?;
             Ok(Field { name: name.to_string(), source: p.source.clone(), name_span, value })
         })?;
-        let mut seen = std::collections::BTreeSet::new();
+        let mut seen = BTreeSet::new();
         for field in all {
             if !seen.insert(field.name.clone()) {
                 let what = format!("`{}` is given twice", field.name);
@@ -402,7 +421,7 @@ impl<'a> Parser<'a> {
             let value = match self.run(word_char) {
                 "inf" | "inff32" | "inff64" => f64::INFINITY,
                 "NaN" | "NaNf32" | "NaNf64" => f64::NAN,
-                _ => return Err(self.error(start..self.at, "this is not a number")),
+                _ => return Err(self.error(start..self.at, "this is not a number").hint("like 1, -0.5 or 1e-3")),
             };
             return Ok(Value::Number(if negative { -value } else { value }));
         }
@@ -417,7 +436,7 @@ impl<'a> Parser<'a> {
         }
         match number(&self.text[digits..self.at]) {
             Some(value) => Ok(Value::Number(if negative { -value } else { value })),
-            None => Err(self.error(start..self.at.max(start + 1), "this is not a number")),
+            None => Err(self.error(start..self.at.max(start + 1), "this is not a number").hint("like 1, -0.5 or 1e-3")),
         }
     }
 
