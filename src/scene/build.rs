@@ -1,6 +1,6 @@
 //! What a scene file means: ranges, names, directions, and the files that it names. Everything wrong is reported at once.
 
-use crate::scene::document::Judge;
+use crate::scene::meaning::Judge;
 use crate::scene::outside::Encoding;
 use crate::scene::path::join;
 use crate::scene::reader::Reader;
@@ -349,11 +349,11 @@ pub fn complete(file: &SceneFile, root: &crate::scene::tree::Node) -> SceneFile 
         object.name.get_or_insert(object_name(i));
         object.mesh.get_or_insert_with(default_mesh);
         if let (Some(raw), Some(node)) = (&mut object.technique, root.get(&format!("objects[{i}].technique"))) {
-            raw.0 = node.canonical();
+            raw.0 = node.unwrapped().canonical();
         }
     }
     if let Some(node) = root.get("view.technique") {
-        file.view.technique.0 = node.canonical();
+        file.view.technique.0 = node.unwrapped().canonical();
     }
     file
 }

@@ -4,8 +4,8 @@ use crate::optics::Rgb;
 use crate::optics::medium::Medium;
 use crate::optics::phase::Phase;
 use crate::optics::presets::{Preset, preset, presets};
-use crate::scene::document::Judge;
 use crate::scene::fields::Triple;
+use crate::scene::meaning::Judge;
 use crate::scene::path::join;
 use serde::{Deserialize, Serialize};
 

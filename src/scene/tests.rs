@@ -213,6 +213,7 @@ fn what_is_set_on_the_command_line_is_read_and_complained_about_as_such() {
 fn defaults_written_out_read_as_the_same() {
     let (dir, path) = folder();
     let reader = reader();
+    assert!(reader.defaults(&path).unwrap().contains("technique: SphericalThickness(bands: 5),"));
     for (file, again) in [("scene.ron", "again.ron"), ("material.ron", "again_material.ron")] {
         let text = reader.defaults(&dir.path().join(file)).unwrap();
         std::fs::write(dir.path().join(again), &text).unwrap();
