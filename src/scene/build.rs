@@ -1,7 +1,6 @@
 //! What a scene file means: ranges, names, directions, and the files that it names. Everything wrong is reported at once.
 
-use crate::scene::document::Judge;
-use crate::scene::fields::TextureSpec;
+use crate::scene::meaning::Judge;
 use crate::scene::outside::Encoding;
 use crate::scene::path::join;
 use crate::scene::reader::Reader;
@@ -138,14 +137,8 @@ fn sky(path: &str, spec: &EnvironmentSpec, reader: &Reader, judge: &mut Judge<'_
         (Some(image), None) => match reader.texture(judge.node(&image_path), image, Encoding::Srgb) {
             Ok((texture, file, warnings)) => {
                 warnings.into_iter().for_each(|w| judge.found(&image_path, w));
-                let TextureSpec { channel, range, invert, .. } = TextureSpec {
-                    image: String::new(),
-                    channel: Default::default(),
-                    range: (0.0, 1.0),
-                    invert: false,
-                    encoding: None,
-                };
                 let (path, key, encoding) = (file.path, file.key, Encoding::Srgb);
+                let (channel, range, invert) = (Default::default(), (0.0, 1.0), false);
                 Some(Sky::Image(Arc::new(TextureMap { path, key, encoding, channel, range, invert, texture })))
             }
             Err(problem) => {
@@ -356,11 +349,11 @@ pub fn complete(file: &SceneFile, root: &crate::scene::tree::Node) -> SceneFile 
         object.name.get_or_insert(object_name(i));
         object.mesh.get_or_insert_with(default_mesh);
         if let (Some(raw), Some(node)) = (&mut object.technique, root.get(&format!("objects[{i}].technique"))) {
-            raw.0 = node.canonical();
+            raw.0 = node.unwrapped().canonical();
         }
     }
     if let Some(node) = root.get("view.technique") {
-        file.view.technique.0 = node.canonical();
+        file.view.technique.0 = node.unwrapped().canonical();
     }
     file
 }
@@ -373,5 +366,5 @@ pub fn default_material(reader: &Reader) -> Material {
         "Material(version: 1)".to_string(),
     ))
     .expect("this is RON");
-    crate::scene::material::build(&Default::default(), reader, &mut Judge::new(&root))
+    crate::scene::material::build(&Default::default(), reader, &mut Judge::new(&root)).expect("the defaults are sound")
 }

@@ -72,7 +72,8 @@ impl de::Error for Wrong {
         Wrong::invalid_type(found, expected)
     }
     fn invalid_length(found: usize, expected: &dyn Expected) -> Wrong {
-        Wrong::new(format!("expected {expected}, found {found} value{}", if found == 1 { "" } else { "s" }), None)
+        let found = format!("{found} value{}", if found == 1 { "" } else { "s" });
+        Wrong::new(format!("expected {expected}, found {found}"), Some(format!("write {expected}")))
     }
     fn unknown_variant(word: &str, known: &'static [&'static str]) -> Wrong {
         Wrong::new(format!("`{word}` is not known here"), Some(suggest(word, known.iter().copied())))
@@ -124,7 +125,8 @@ impl<'a> Cursor<'a> {
             Value::Tuple(None, _) => "values in ( )".to_string(),
             Value::Struct(None, _) => "a struct ( )".to_string(),
         };
-        self.placed(Err(Wrong::new(format!("expected {expected}, found {found}"), None)))
+        let hint = Some(format!("write {expected}"));
+        self.placed(Err(Wrong::new(format!("expected {expected}, found {found}"), hint)))
     }
 
     fn integer<T: TryFrom<i128>>(self, range: &str) -> Result<T, Wrong> {
@@ -143,7 +145,11 @@ impl<'a> Cursor<'a> {
         let left = left.count();
         match left {
             0 => Ok(value),
-            _ => Err(Wrong::new(format!("expected {} values, found {}", items.len() - left, items.len()), None)),
+            _ => {
+                let wanted = items.len() - left;
+                let what = format!("expected {wanted} values, found {}", items.len());
+                Err(Wrong::new(what, Some(format!("write {wanted} values"))))
+            }
         }
     }
 }
@@ -208,7 +214,7 @@ impl<'a> Deserializer<'a> for Cursor<'a> {
     fn deserialize_str<V: Visitor<'a>>(self, visitor: V) -> Result<V::Value, Wrong> {
         match &self.node.value {
             Value::Text(text) => self.placed(visitor.visit_borrowed_str(text)),
-            _ => self.unfit(&"a text in \""),
+            _ => self.unfit(&"a text in quotes"),
         }
     }
     fn deserialize_string<V: Visitor<'a>>(self, visitor: V) -> Result<V::Value, Wrong> {
@@ -249,7 +255,7 @@ impl<'a> Deserializer<'a> for Cursor<'a> {
             }
             Value::Tuple(_, items) | Value::List(items) if self.name().is_none() => {
                 let what = format!("expected {len} values in ( ), found {}", items.len());
-                self.placed(Err(Wrong::new(what, None)))
+                self.placed(Err(Wrong::new(what, Some(format!("write {len} values")))))
             }
             _ => self.unfit(&format!("{len} values in ( )").as_str()),
         }

@@ -3,9 +3,8 @@
 //! These stop at the first error, since what follows it would be guesswork. Meaning comes later, all at once, in
 //! [`super::meaning`].
 
-use crate::problem::{Problem, nearest};
-use crate::scene::de::{self, suggest};
-use crate::scene::path::join;
+use crate::problem::{At, Problem, nearest};
+use crate::scene::de;
 use crate::scene::tree::{Field, Node, Source, SyntaxError, Value, shown};
 use crate::store::{File, Files};
 use ron::extensions::Extensions;
@@ -48,7 +47,7 @@ pub fn parse(source: &Arc<Source>) -> Result<Node, Problem> {
 
 /// The text of a file that was read.
 pub fn text(file: &File) -> Result<Arc<Source>, Problem> {
-    let whole = |what: String| Problem::files(what).at(crate::problem::At::file(&shown(&file.path)));
+    let whole = |what: String| Problem::files(what).at(At::file(&shown(&file.path)));
     if file.bytes.len() > MAX_BYTES {
         let what = format!("the file has {} bytes, more than the {MAX_BYTES} that are read", file.bytes.len());
         return Err(whole(what).hint("is this a scene or a material?"));
@@ -153,9 +152,15 @@ fn unreadable(path: &Path, error: &std::io::Error) -> Problem {
         .map(|all| all.flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect())
         .unwrap_or_default();
     there.sort();
+    // What all names share, the extension, says nothing of which is meant.
+    let stem = |name: &str| Path::new(name).with_extension("").to_string_lossy().into_owned();
+    let alike = |name: &String| Path::new(name).extension() == path.extension();
+    let stems: Vec<String> = there.iter().filter(|name| alike(name)).map(|name| stem(name)).collect();
+    let near = nearest(&stem(&file), stems.iter().map(String::as_str));
+    let near = there.iter().find(|name| alike(name) && Some(stem(name).as_str()) == near);
     let looked = format!("looked in {}", shown(folder).display());
-    let hint = match nearest(&file, there.iter().map(String::as_str)) {
-        Some(right) if right != file => format!("{looked}; did you mean `{right}`?"),
+    let hint = match near {
+        Some(right) if *right != file => format!("{looked}; did you mean `{right}`?"),
         _ if path.components().any(|c| c.as_os_str() == "models") => {
             format!("{looked}; tools/fetch-models brings the models")
         }
@@ -164,9 +169,7 @@ fn unreadable(path: &Path, error: &std::io::Error) -> Problem {
         }
         _ => format!("{looked}; paths are relative to the file that names them"),
     };
-    Problem::files(format!("cannot read `{}`: {why}", shown(path).display()))
-        .at(crate::problem::At::file(&shown(path)))
-        .hint(hint)
+    Problem::files(format!("cannot read `{}`: {why}", shown(path).display())).at(At::file(&shown(path))).hint(hint)
 }
 
 /// A material file with all that it inherits, each value with the place that it came from.
@@ -176,7 +179,7 @@ fn unreadable(path: &Path, error: &std::io::Error) -> Problem {
 pub fn material(files: &Files, file: &File, fits: &dyn Fn(&Node) -> Result<(), Problem>) -> Result<Node, Problem> {
     let mut chain = vec![file.path.clone()];
     let mut tree = head_of(file, fits)?;
-    while let Some(base) = tree.field("base").filter(|n| n.name() != Some("None")).cloned() {
+    while let Some(base) = tree.field("base").map(Node::unwrapped).filter(|n| n.name() != Some("None")).cloned() {
         let name = match &base.value {
             Value::Text(name) => name.clone(),
             _ => typed::<String>(&base, "base")?,
@@ -255,80 +258,4 @@ pub fn rebase(root: &mut Node, path: &Path) {
         }
     }
     each(root, path.parent().unwrap_or(Path::new("")));
-}
-
-/// What is wrong with what the files mean: found all at once, each thing at its place.
-pub struct Judge<'a> {
-    pub root: &'a Node,
-    pub problems: Vec<Problem>,
-}
-
-impl<'a> Judge<'a> {
-    /// Numbers that are none are found at once, wherever they are.
-    pub fn new(root: &'a Node) -> Judge<'a> {
-        let mut judge = Judge { root, problems: Vec::new() };
-        root.walk("", &mut |path, node| {
-            if let Value::Number(n) = node.value
-                && !n.is_finite()
-            {
-                judge.problems.push(
-                    Problem::files(format!("{} is not a finite number", node.text()))
-                        .at(node.at())
-                        .path(path)
-                        .hint("write a number"),
-                );
-            }
-        });
-        judge
-    }
-    pub fn node(&self, path: &str) -> &'a Node {
-        self.root.nearest(path)
-    }
-    /// The value as it was written, or `the default` where it was not.
-    pub fn written(&self, path: &str) -> String {
-        let text = self.root.get(path).map_or("the default", |node| node.text());
-        if text.chars().count() > 40 || text.contains('\n') { "this".to_string() } else { text.to_string() }
-    }
-    pub fn wrong(&mut self, path: &str, what: impl Into<String>, hint: impl Into<String>) {
-        self.problems.push(Problem::files(what).at(self.node(path).at()).path(path).hint(hint));
-    }
-    pub fn warn(&mut self, path: &str, what: impl Into<String>, hint: impl Into<String>) {
-        self.problems.push(Problem::warning(what).at(self.node(path).at()).path(path).hint(hint));
-    }
-    /// What was found elsewhere, on behalf of the value at `path`.
-    pub fn found(&mut self, path: &str, problem: Problem) {
-        self.problems.push(Problem { path: Some(path.to_string()), ..problem });
-    }
-
-    /// That each of `values` is `allowed`; what is not finite was said already.
-    pub fn all(&mut self, path: &str, values: &[f64], allowed: impl Fn(f64) -> bool, range: &str) {
-        if values.iter().all(|v| v.is_finite()) && !values.iter().all(|v| allowed(*v)) {
-            // One number of several is marked by itself where it is written by itself.
-            let member = values.iter().position(|v| !allowed(*v)).map(|i| format!("{path}.{i}"));
-            let place = match member.filter(|m| values.len() > 1 && self.root.get(m).is_some()) {
-                Some(member) => member,
-                None => path.to_string(),
-            };
-            let node = self.node(&place);
-            let what = format!("{} is not allowed", self.written(&place));
-            self.problems.push(Problem::files(what).at(node.at()).path(path).hint(range));
-        }
-    }
-    /// That a name is not empty and not among `seen`.
-    pub fn name(&mut self, path: &str, name: &str, seen: &mut Vec<String>) {
-        if name.trim().is_empty() {
-            self.wrong(&join(path, "name"), "a name cannot be empty", "give it a name: messages and --set use it");
-        } else if seen.iter().any(|s| s == name) {
-            self.wrong(&join(path, "name"), format!("`{name}` is the name of another one too"), "choose another name");
-        }
-        seen.push(name.to_string());
-    }
-    /// That `word` is one of `known`.
-    pub fn known(&mut self, path: &str, word: &str, what: &str, known: &[&str]) -> bool {
-        let ok = known.contains(&word);
-        if !ok {
-            self.wrong(path, format!("there is no {what} `{word}`"), suggest(word, known.iter().copied()));
-        }
-        ok
-    }
 }

@@ -1,17 +1,17 @@
 //! What a substance is: its surface, its medium, its layers, and the kernel that the artist wants for it.
 
-use crate::problem::Problem;
-use crate::scene::document::Judge;
-use crate::scene::fields::{Spec, TextureSpec, Triple};
-use crate::optics::phase::Phase;
-use crate::scene::material_file::{Curve, Filter, LayerSpec, MaterialFile, Profile};
+use crate::optics::Rgb;
 use crate::optics::medium::Medium;
+use crate::optics::phase::Phase;
+use crate::problem::Problem;
+use crate::scene::fields::{Spec, TextureSpec, Triple};
+use crate::scene::material_file::{Curve, Filter, LayerSpec, MaterialFile, Profile};
+use crate::scene::meaning::Judge;
 use crate::scene::medium::{MediumSpec, Substance};
 use crate::scene::outside::{Channel, Encoding, Texture};
 use crate::scene::path::join;
 use crate::scene::reader::Reader;
 use crate::store::Key;
-use glam::DVec3;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -41,7 +41,7 @@ pub struct Surface {
     /// Perceptual, [0, 1]; 0 is smooth.
     pub roughness: Varying<f64>,
     /// Multiplies the scattered light once, where it leaves. [0, 1], linear.
-    pub color: Varying<DVec3>,
+    pub color: Varying<Rgb>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -82,8 +82,8 @@ impl PartialEq for TextureMap {
     }
 }
 
-/// The material that `file` spells, as far as it can be made; it is valid when `judge` found no error.
-pub fn build(file: &MaterialFile, reader: &Reader, judge: &mut Judge<'_>) -> Material {
+/// The material that `file` spells, when it means something; `judge` holds what is wrong.
+pub fn build(file: &MaterialFile, reader: &Reader, judge: &mut Judge<'_>) -> Option<Material> {
     let medium = &file.medium;
     medium.check(judge, "medium");
     let ior = file.surface.ior.unwrap_or(medium.default_ior());
@@ -107,31 +107,57 @@ pub fn build(file: &MaterialFile, reader: &Reader, judge: &mut Judge<'_>) -> Mat
     let color = match &file.surface.color {
         Spec::Constant(Triple(value)) => {
             judge.all("surface.color", value, share, "from 0 to 1");
-            Some(Varying::Constant(DVec3::from(*value)))
+            Some(Varying::Constant(Rgb::from(*value)))
         }
         Spec::Texture(spec) => {
             texture("surface.color", spec, Encoding::Srgb, &share, "from 0 to 1", reader, judge).map(Varying::Texture)
         }
     };
-    let layers = layers(file, reader, judge);
-    let substance = medium.resolve(ior, file.phase);
-    Material {
-        surface: Surface {
-            ior,
-            roughness: roughness.unwrap_or(Varying::Constant(0.0)),
-            color: color.unwrap_or(Varying::Constant(DVec3::ONE)),
-        },
+    let depths = depths(file, reader, judge);
+    if judge.problems.iter().any(Problem::is_error) {
+        return None;
+    }
+    let phase = file.phase.unwrap_or(medium.default_phase());
+    let substance = dense_enough("medium", medium.resolve(ior, phase), judge)?;
+    let layers = file.layers.iter().zip(depths).enumerate().map(|(i, (layer, depth))| {
+        let phase = layer_phase(layer, file);
+        match dense_enough(&format!("layers[{i}].medium"), layer.medium.resolve(ior, phase), judge)? {
+            Substance::Translucent(medium) => {
+                Some(Layer { name: layer.name.clone().unwrap_or_else(|| layer_name(i)), medium, phase, depth: depth? })
+            }
+            Substance::Opaque { .. } => None,
+        }
+    });
+    Some(Material {
+        layers: layers.collect::<Option<_>>()?,
+        surface: Surface { ior, roughness: roughness?, color: color? },
         albedo: match &substance {
             Substance::Translucent(medium) => medium.multiple_scattering_albedo(ior),
             Substance::Opaque { albedo } => *albedo,
         },
         medium: substance,
         spelled: medium.clone(),
-        phase: file.phase,
+        phase,
         profile: file.profile,
         filter: file.filter.clone(),
-        layers,
+    })
+}
+
+/// A mean free path so short that its coefficients are no numbers any more.
+fn dense_enough(path: &str, substance: Substance, judge: &mut Judge<'_>) -> Option<Substance> {
+    match &substance {
+        Substance::Translucent(m) if !(m.sigma_t().is_finite() && m.g.is_finite()) => {
+            judge.wrong(path, "this medium is too dense to compute with", "a longer mean free path: it is in mm");
+            None
+        }
+        _ => Some(substance),
     }
+}
+
+/// A layer's own, else its preset's, else the material's.
+fn layer_phase(layer: &LayerSpec, file: &MaterialFile) -> Phase {
+    let preset = matches!(layer.medium, MediumSpec::Preset(_)).then(|| layer.medium.default_phase());
+    layer.phase.or(preset).or(file.phase).unwrap_or(file.medium.default_phase())
 }
 
 /// The file with what it leaves to others filled in: `diaphane check --defaults`.
@@ -139,10 +165,12 @@ pub fn complete(file: &MaterialFile) -> MaterialFile {
     let mut file = file.clone();
     file.base = None;
     file.surface.ior.get_or_insert(file.medium.default_ior());
-    for (i, layer) in file.layers.iter_mut().enumerate() {
+    let phases: Vec<Phase> = file.layers.iter().map(|layer| layer_phase(layer, &file)).collect();
+    for (i, (layer, phase)) in file.layers.iter_mut().zip(phases).enumerate() {
         layer.name.get_or_insert(layer_name(i));
-        layer.phase.get_or_insert(file.phase);
+        layer.phase = Some(phase);
     }
+    file.phase.get_or_insert(file.medium.default_phase());
     file
 }
 
@@ -150,18 +178,18 @@ fn layer_name(i: usize) -> String {
     format!("layer {i}")
 }
 
-fn layers(file: &MaterialFile, reader: &Reader, judge: &mut Judge<'_>) -> Vec<Layer> {
+/// Where each layer ends; `None` where that is wrong.
+fn depths(file: &MaterialFile, reader: &Reader, judge: &mut Judge<'_>) -> Vec<Option<Varying<f64>>> {
     let mut names = Vec::new();
     let mut deepest: Option<f64> = None;
     let mut out = Vec::new();
     for (i, layer) in file.layers.iter().enumerate() {
         let path = format!("layers[{i}]");
-        let LayerSpec { name, medium, phase, depth } = layer;
+        let LayerSpec { name, medium, depth, .. } = layer;
         let name = name.clone().unwrap_or_else(|| layer_name(i));
         judge.name(&path, &name, &mut names);
         let medium_path = join(&path, "medium");
         medium.check(judge, &medium_path);
-        let substance = medium.resolve(file.surface.ior.unwrap_or(1.3), layer.phase.unwrap_or(file.phase));
         if medium.is_opaque() {
             judge.wrong(
                 &medium_path,
@@ -192,9 +220,7 @@ fn layers(file: &MaterialFile, reader: &Reader, judge: &mut Judge<'_>) -> Vec<La
                 map.map(Varying::Texture)
             }
         };
-        if let (Substance::Translucent(medium), Some(depth)) = (substance, depth) {
-            out.push(Layer { name, medium, phase: phase.unwrap_or(file.phase), depth });
-        }
+        out.push(depth);
     }
     out
 }

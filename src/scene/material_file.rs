@@ -13,7 +13,8 @@ pub struct MaterialFile {
     pub base: Option<String>,
     pub surface: SurfaceSpec,
     pub medium: MediumSpec,
-    pub phase: Phase,
+    /// The medium's own when it is left out.
+    pub phase: Option<Phase>,
     pub profile: Profile,
     pub filter: Filter,
     pub layers: Vec<LayerSpec>,
@@ -26,7 +27,7 @@ impl Default for MaterialFile {
             base: None,
             surface: SurfaceSpec::default(),
             medium: MediumSpec::Preset("marble".to_string()),
-            phase: Phase::default(),
+            phase: None,
             profile: Profile::default(),
             filter: Filter::default(),
             layers: Vec::new(),

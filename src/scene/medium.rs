@@ -1,12 +1,12 @@
 //! The spellings of a medium in a file, and what each of them comes to.
 
+use crate::optics::Rgb;
 use crate::optics::medium::Medium;
 use crate::optics::phase::Phase;
-use crate::optics::presets::{preset, presets};
-use crate::scene::document::Judge;
+use crate::optics::presets::{Preset, preset, presets};
 use crate::scene::fields::Triple;
+use crate::scene::meaning::Judge;
 use crate::scene::path::join;
-use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// What lies inside a surface.
@@ -15,7 +15,7 @@ pub enum Substance {
     Translucent(Medium),
     /// Lambertian: nothing gets in.
     Opaque {
-        albedo: DVec3,
+        albedo: Rgb,
     },
 }
 
@@ -88,7 +88,6 @@ const SHARE: &str = "from 0 to 1";
 impl MediumSpec {
     /// Every number within its range. `path` is where the medium stands.
     pub fn check(&self, judge: &mut Judge<'_>, path: &str) {
-        let before = judge.problems.len();
         let mut coefficients = |values: &[(&str, Triple)]| {
             for (name, value) in values {
                 judge.all(&join(path, name), &value.0, |v| v >= 0.0, AT_LEAST_0);
@@ -132,41 +131,45 @@ impl MediumSpec {
         if let Some((name, g)) = g {
             judge.all(&join(path, name), &[g], |v| v.abs() < 1.0, "between -1 and 1, both excluded");
         }
-        if judge.problems.len() == before
-            && let Substance::Translucent(medium) = self.resolve(1.3, Phase::HenyeyGreenstein)
-            && !(medium.sigma_a.is_finite() && medium.sigma_s.is_finite())
-        {
-            judge.wrong(path, "this medium is too dense to compute with", "a mean free path above 1e-300 mm");
-        }
     }
 
     pub fn is_opaque(&self) -> bool {
         matches!(self, MediumSpec::Opaque(_))
     }
 
+    fn preset(&self) -> Option<Preset> {
+        match self {
+            MediumSpec::Preset(name) => preset(name),
+            _ => None,
+        }
+    }
+
     /// The index of refraction of a surface that does not give one.
     pub fn default_ior(&self) -> f64 {
         match self {
             MediumSpec::Opaque(_) => 1.0,
-            MediumSpec::Preset(name) => preset(name).map_or(1.3, |p| p.ior),
-            _ => 1.3,
+            _ => self.preset().map_or(1.3, |p| p.ior),
         }
     }
 
-    /// What the spelling comes to, under a surface of this index of refraction and with this phase function, of which `g` is
-    /// the parameter. Its numbers are within their ranges.
+    /// The phase function of a medium for which none is given.
+    pub fn default_phase(&self) -> Phase {
+        self.preset().map_or(Phase::default(), |p| p.phase)
+    }
+
+    /// What the spelling comes to, under a surface of this index of refraction. Its numbers are within their ranges.
+    /// g is the phase function's own parameter; the medium's is the mean cosine that follows.
     pub fn resolve(&self, ior: f64, phase: Phase) -> Substance {
-        let v = |t: Triple| DVec3::from(t.0);
-        let g = |g: f64| DVec3::splat(phase.mean_cosine(g));
+        let rgb = |t: Triple| Rgb::from(t.0);
+        let g = |parameter: f64| Rgb::splat(phase.mean_cosine(parameter));
         Substance::Translucent(match self {
-            MediumSpec::ReducedCoefficients(m) => Medium::reduced_coefficients(v(m.sigma_a), v(m.sigma_s_prime)),
-            MediumSpec::Coefficients(m) => Medium::coefficients(v(m.sigma_a), v(m.sigma_s), g(m.g)),
-            MediumSpec::Extinction(m) => Medium::extinction(v(m.sigma_t), v(m.albedo), g(m.g)),
-            MediumSpec::AlbedoMfp(m) => Medium::albedo_mfp(v(m.albedo), v(m.mfp), g(m.g)),
-            MediumSpec::Color(m) => Medium::color(v(m.color), m.radius, v(m.radius_scale), g(m.anisotropy), ior),
-            // A misspelt name was reported; any medium serves until it is mended.
-            MediumSpec::Preset(name) => preset(name).map_or(Medium::coefficients(v(Triple::all(0.0)), v(Triple::all(1.0)), g(0.0)), |p| p.medium),
-            MediumSpec::Opaque(m) => return Substance::Opaque { albedo: v(m.albedo) },
+            MediumSpec::ReducedCoefficients(m) => Medium::reduced_coefficients(rgb(m.sigma_a), rgb(m.sigma_s_prime)),
+            MediumSpec::Coefficients(m) => Medium::coefficients(rgb(m.sigma_a), rgb(m.sigma_s), g(m.g)),
+            MediumSpec::Extinction(m) => Medium::extinction(rgb(m.sigma_t), rgb(m.albedo), g(m.g)),
+            MediumSpec::AlbedoMfp(m) => Medium::albedo_mfp(rgb(m.albedo), rgb(m.mfp), g(m.g)),
+            MediumSpec::Color(m) => Medium::color(rgb(m.color), m.radius, rgb(m.radius_scale), g(m.anisotropy), ior),
+            MediumSpec::Preset(name) => preset(name).expect("unknown names were refused").medium,
+            MediumSpec::Opaque(m) => return Substance::Opaque { albedo: rgb(m.albedo) },
         })
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! The only room that knows RON. A text becomes a [`tree`] in which every value knows its place; `base:` and `--set`
 //! change the tree; [`de`] reads the schema ([`scene_file`], [`material_file`]) from it; what the values mean is judged
-//! all at once ([`build`], [`material`], [`warn`]). The tour of a read is [`Reader::scene`].
+//! all at once ([`meaning`], [`build`], [`material`], [`warn`]). The tour of a read is [`Reader::scene`].
 //!
 //! Lengths of scenes are scene units, those of materials mm; angles are degrees and say so; all numbers are f64. Every
 //! type here is `Serialize`, so that what depends on it can be named by its hash; file contents stand as their [`Key`].
@@ -13,10 +13,12 @@ mod document;
 mod fields;
 mod material;
 mod material_file;
+mod meaning;
 mod medium;
 mod outside;
 mod path;
 mod reader;
+mod scalar;
 mod scene_file;
 mod technique;
 mod tree;
@@ -30,10 +32,9 @@ pub use document::Kind;
 pub use fields::Triple;
 pub use material::{Layer, Material, Surface, TextureMap, Varying};
 pub use material_file::{
-    BoxKernel, Curve, Diffusion, Exponential, Filter, FromMedium, Gaussian, Length, Neighbours, Normalized, Profile, Weights,
+    BoxKernel, Curve, Diffusion, Exponential, Filter, FromMedium, Gaussian, Length, Neighbours, Normalized, Profile,
+    Weights,
 };
-pub use crate::optics::medium::Medium;
-pub use crate::optics::phase::Phase;
 pub use medium::{MediumSpec, Substance};
 pub use outside::{Channel, Encoding, Mesh, Texture, Tone};
 pub use reader::Reader;

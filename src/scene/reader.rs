@@ -1,9 +1,10 @@
 //! Reads scenes and materials, and remembers what was costly: meshes and images of the same content are read once.
 
 use crate::problem::{Problem, Problems};
-use crate::scene::document::{self, Judge, Kind, check_head, named, typed};
+use crate::scene::document::{self, Kind, check_head, named, typed};
 use crate::scene::material::{at_its_name, build as build_material, complete};
 use crate::scene::material_file::MaterialFile;
+use crate::scene::meaning::Judge;
 use crate::scene::outside::{Encoding, Mesh, Texture, decode, read_obj};
 use crate::scene::scene_file::SceneFile;
 use crate::scene::tree::Node;
@@ -54,7 +55,7 @@ impl Reader {
         match scene.filter(|_| !judge.problems.iter().any(Problem::is_error)) {
             Some(scene) => {
                 warn::scene(&scene, self, &mut judge);
-                Ok((scene, judge.problems))
+                Ok((scene, in_order(judge.problems).0))
             }
             None => Err(in_order(judge.problems)),
         }
@@ -119,11 +120,10 @@ impl Reader {
         let spelled: MaterialFile = typed(&root, "")?;
         let mut judge = Judge::new(&root);
         let material = build_material(&spelled, self, &mut judge);
-        if judge.problems.iter().any(Problem::is_error) {
-            return Ok((None, judge.problems));
+        if let Some(material) = &material {
+            warn::material(material, &mut judge);
         }
-        warn::material(&material, &mut judge);
-        Ok((Some(material), judge.problems))
+        Ok((material, judge.problems))
     }
 
     pub(super) fn default_material(&self) -> Arc<Material> {
@@ -216,7 +216,7 @@ impl Reader {
     }
 }
 
-/// By file, then by place; what was found in the order of meaning is shown in the order of the text.
+/// Once each, by file, then by place; what was found in the order of meaning is shown in the order of the text.
 fn in_order(mut problems: Vec<Problem>) -> Problems {
     let mut files: Vec<PathBuf> = Vec::new();
     for at in problems.iter().filter_map(|p| p.at.as_ref()) {

@@ -35,12 +35,14 @@ pub enum LightSpec {
 }
 
 macro_rules! spec {
-    ($(#[$meta:meta])* $name:ident as $word:literal { $($field:ident: $type:ty = $default:expr),* $(,)? }) => {
+    ($(#[$meta:meta])* $name:ident as $word:literal {
+        $($(#[$field_meta:meta])* $field:ident: $type:ty = $default:expr),* $(,)?
+    }) => {
         $(#[$meta])*
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(rename = $word, default, deny_unknown_fields)]
         pub struct $name {
-            $(pub $field: $type),*
+            $($(#[$field_meta])* pub $field: $type),*
         }
         impl Default for $name {
             fn default() -> $name {
@@ -48,6 +50,14 @@ macro_rules! spec {
             }
         }
     };
+}
+
+/// Without the `Some` that nobody writes.
+fn bare<S: serde::Serializer>(raw: &Option<Raw>, serializer: S) -> Result<S::Ok, S::Error> {
+    match raw {
+        Some(raw) => raw.serialize(serializer),
+        None => serializer.serialize_none(),
+    }
 }
 
 spec! { DirectionalSpec as "Directional" {
@@ -90,6 +100,7 @@ spec! { ObjectSpec as "Object" {
     normals: Normals = Normals::Auto,
     visible: bool = true,
     deform: Vec<Deform> = Vec::new(),
+    #[serde(serialize_with = "bare")]
     technique: Option<Raw> = None,
 } }
 spec! { TransformSpec as "Transform" {

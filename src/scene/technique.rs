@@ -30,6 +30,7 @@ impl PartialEq for TechniqueText {
 
 impl TechniqueText {
     pub(super) fn of(node: &Node, path: &str) -> Result<TechniqueText, Problem> {
+        let node = node.unwrapped();
         match node.name() {
             Some(name) => Ok(TechniqueText {
                 name: name.to_string(),

@@ -6,6 +6,7 @@
 //! tolerant, since the ron crate has the last word on what is RON; it is bounded in depth and in the number of values.
 
 use crate::problem::At;
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -135,6 +136,13 @@ impl Node {
         self.fields()?.iter().find(|f| f.name == name).map(|f| &f.value)
     }
 
+    /// `x` of `Some(x)`, which may be left out.
+    pub fn unwrapped(&self) -> &Node {
+        match &self.value {
+            Value::Tuple(Some(name), items) if name == "Some" && items.len() == 1 => items[0].unwrapped(),
+            _ => self,
+        }
+    }
     /// What stands in the brackets of `Name(a: 1)`: the same without its name. `Name` alone has nothing there.
     pub fn content(&self) -> Node {
         let value = match &self.value {
@@ -171,47 +179,48 @@ impl Node {
 }
 
 impl SyntaxError {
-    fn hint(mut self, hint: impl Into<String>) -> SyntaxError {
+    pub(super) fn hint(mut self, hint: impl Into<String>) -> SyntaxError {
         self.hint = Some(hint.into());
         self
     }
 }
 
-struct Parser<'a> {
+pub(super) struct Parser<'a> {
     source: &'a Arc<Source>,
-    text: &'a str,
-    at: usize,
+    pub(super) text: &'a str,
+    /// The byte that is read next.
+    pub(super) at: usize,
     nodes: usize,
 }
 
 fn word_start(c: char) -> bool {
     c == '_' || c.is_alphabetic()
 }
-fn word_char(c: char) -> bool {
+pub(super) fn word_char(c: char) -> bool {
     c == '_' || c.is_alphanumeric()
 }
 
 impl<'a> Parser<'a> {
-    fn rest(&self) -> &'a str {
+    pub(super) fn rest(&self) -> &'a str {
         &self.text[self.at..]
     }
-    fn peek(&self) -> Option<char> {
+    pub(super) fn peek(&self) -> Option<char> {
         self.rest().chars().next()
     }
-    fn eat(&mut self, token: &str) -> bool {
+    pub(super) fn eat(&mut self, token: &str) -> bool {
         let found = self.rest().starts_with(token);
         if found {
             self.at += token.len();
         }
         found
     }
-    fn run(&mut self, of: impl Fn(char) -> bool) -> &'a str {
+    pub(super) fn run(&mut self, of: impl Fn(char) -> bool) -> &'a str {
         let rest = self.rest();
         let len = rest.find(|c| !of(c)).unwrap_or(rest.len());
         self.at += len;
         &rest[..len]
     }
-    fn error(&self, span: Range<usize>, what: impl Into<String>) -> SyntaxError {
+    pub(super) fn error(&self, span: Range<usize>, what: impl Into<String>) -> SyntaxError {
         SyntaxError { span, what: what.into(), hint: None }
     }
     /// An error at the next character.
@@ -271,7 +280,8 @@ impl<'a> Parser<'a> {
     fn node(&mut self, start: usize, value: Value) -> Result<Node, SyntaxError> {
         self.nodes += 1;
         if self.nodes > MAX_NODES {
-            return Err(self.error(start..self.at, format!("the text holds more than {MAX_NODES} values")));
+            let what = format!("the text holds more than {MAX_NODES} values");
+            return Err(self.error(start..self.at, what).hint("put what is large into a mesh or an image"));
         }
         Ok(Node { source: self.source.clone(), span: start..self.at, value })
     }
@@ -280,16 +290,14 @@ impl<'a> Parser<'a> {
         self.blank()?;
         let start = self.at;
         if depth > MAX_DEPTH {
-            return Err(self.wrong(format!("brackets are nested more than {MAX_DEPTH} deep")));
+            return Err(self
+                .wrong(format!("brackets are nested more than {MAX_DEPTH} deep"))
+                .hint("close some before"));
         }
         let value = match self.peek() {
             Some('(') => self.parens(None, depth)?,
             Some('[') => Value::List(self.items('[', ']', |p| p.value(depth + 1))?),
-            Some('{') => Value::Map(self.items('{', '}', |p| {
-                let key = p.value(depth + 1)?;
-                p.colon("a key")?;
-                Ok((key, p.value(depth + 1)?))
-            })?),
+            Some('{') => self.map(depth)?,
             Some('"') => Value::Text(self.string()?),
             Some('\'') => self.char()?,
             Some('0'..='9' | '+' | '-' | '.') => self.number()?,
@@ -314,16 +322,33 @@ impl<'a> Parser<'a> {
                     }
                 }
             },
-            _ => return Err(self.wrong(format!("expected a value, {}", self.found()))),
+            _ => {
+                let hint = "a number, true or false, a \"text\", a [list], a {map}, a (struct) or a Name(…)";
+                return Err(self.wrong(format!("expected a value, {}", self.found())).hint(hint));
+            }
         };
         self.node(start, value)
+    }
+
+    fn map(&mut self, depth: usize) -> Result<Value, SyntaxError> {
+        let mut seen = BTreeSet::new();
+        let items = self.items('{', '}', |p| {
+            let key = p.value(depth + 1)?;
+            if !seen.insert(key.canonical()) {
+                let what = format!("{} is given twice", key.text());
+                return Err(p.error(key.span, what).hint("keep one of them"));
+            }
+            p.colon("a key")?;
+            Ok((key, p.value(depth + 1)?))
+        })?;
+        Ok(Value::Map(items))
     }
 
     fn colon(&mut self, after: &str) -> Result<(), SyntaxError> {
         self.blank()?;
         match self.eat(":") {
             true => Ok(()),
-            false => Err(self.wrong(format!("expected `:` after {after}, {}", self.found()))),
+            false => Err(self.wrong(format!("expected `:` after {after}, {}", self.found())).hint("name: value")),
         }
     }
 
@@ -351,7 +376,9 @@ impl<'a> Parser<'a> {
             items.push(item(self)?);
             self.blank()?;
             if !self.eat(",") && self.peek() != Some(close) && self.peek().is_some() {
-                return Err(self.wrong(format!("expected `,` or `{close}`, {}", self.found())));
+                return Err(self
+                    .wrong(format!("expected `,` or `{close}`, {}", self.found()))
+                    .hint("a comma stands between two values"));
             }
         }
     }
@@ -370,14 +397,14 @@ impl<'a> Parser<'a> {
         let all = self.items('(', ')', |p| {
             let at = p.at;
             let Some(name) = p.field_name() else {
-                return Err(p.wrong(format!("expected the name of a field, {}", p.found())));
+                return Err(p.wrong(format!("expected the name of a field, {}", p.found())).hint("name: value"));
             };
             let name_span = at..p.at;
             p.colon(&format!("`{name}`"))?;
             let value = p.value(depth + 1)?;
             Ok(Field { name: name.to_string(), source: p.source.clone(), name_span, value })
         })?;
-        let mut seen = std::collections::BTreeSet::new();
+        let mut seen = BTreeSet::new();
         for field in all {
             if !seen.insert(field.name.clone()) {
                 let what = format!("`{}` is given twice", field.name);
@@ -393,136 +420,6 @@ impl<'a> Parser<'a> {
         self.peek().filter(|c| word_start(*c))?;
         Some(self.run(word_char))
     }
-
-    fn number(&mut self) -> Result<Value, SyntaxError> {
-        let start = self.at;
-        let negative = self.peek() == Some('-');
-        let signed = self.eat("-") || self.eat("+");
-        if signed && self.peek().is_some_and(char::is_alphabetic) {
-            let value = match self.run(word_char) {
-                "inf" | "inff32" | "inff64" => f64::INFINITY,
-                "NaN" | "NaNf32" | "NaNf64" => f64::NAN,
-                _ => return Err(self.error(start..self.at, "this is not a number")),
-            };
-            return Ok(Value::Number(if negative { -value } else { value }));
-        }
-        let digits = self.at;
-        loop {
-            self.run(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '.'));
-            let so_far = &self.text[digits..self.at];
-            let exponent = so_far.ends_with(['e', 'E']) && !so_far.starts_with("0x");
-            if !(exponent && (self.eat("-") || self.eat("+"))) {
-                break;
-            }
-        }
-        match number(&self.text[digits..self.at]) {
-            Some(value) => Ok(Value::Number(if negative { -value } else { value })),
-            None => Err(self.error(start..self.at.max(start + 1), "this is not a number")),
-        }
-    }
-
-    fn string(&mut self) -> Result<String, SyntaxError> {
-        let start = self.at;
-        self.at += 1;
-        let mut out = String::new();
-        loop {
-            out.push_str(self.run(|c| c != '"' && c != '\\'));
-            if self.eat("\"") {
-                return Ok(out);
-            }
-            if self.peek().is_none() {
-                return Err(self.error(start..start + 1, "this text never ends").hint("close it with \""));
-            }
-            out.extend(self.escape()?);
-        }
-    }
-
-    /// What a backslash and what follows it stand for; nothing, at the end of a line.
-    fn escape(&mut self) -> Result<Option<char>, SyntaxError> {
-        let start = self.at;
-        self.at += 1;
-        let c = self.peek();
-        self.at += c.map_or(0, char::len_utf8);
-        let code = match c {
-            Some('n') => return Ok(Some('\n')),
-            Some('r') => return Ok(Some('\r')),
-            Some('t') => return Ok(Some('\t')),
-            Some('0') => return Ok(Some('\0')),
-            Some(c @ ('\\' | '"' | '\'')) => return Ok(Some(c)),
-            Some('\n') => {
-                self.run(char::is_whitespace);
-                return Ok(None);
-            }
-            Some('x') => {
-                let rest = self.rest();
-                let digits = rest.get(..2).unwrap_or("");
-                self.at += digits.len();
-                digits
-            }
-            Some('u') if self.eat("{") => {
-                let digits = self.run(|c| c.is_ascii_hexdigit());
-                self.eat("}");
-                digits
-            }
-            _ => "",
-        };
-        let char = u32::from_str_radix(code, 16).ok().and_then(char::from_u32);
-        match char {
-            Some(c) => Ok(Some(c)),
-            None => Err(self
-                .error(start..self.at, "this escape means nothing")
-                .hint("write \\\\ for one backslash, and / between folders")),
-        }
-    }
-
-    fn char(&mut self) -> Result<Value, SyntaxError> {
-        let start = self.at;
-        self.at += 1;
-        let c = match self.peek() {
-            Some('\\') => self.escape()?,
-            c => {
-                self.at += c.map_or(0, char::len_utf8);
-                c
-            }
-        };
-        match (c, self.eat("'")) {
-            (Some(c), true) => Ok(Value::Char(c)),
-            _ => Err(self.error(start..start + 1, "expected one character between two '").hint("texts stand in \"")),
-        }
-    }
-
-    /// `r"…"`, `r#"…"#`, or the raw identifier `r#name`.
-    fn raw(&mut self) -> Result<Value, SyntaxError> {
-        let start = self.at;
-        self.at += 1;
-        let hashes = self.run(|c| c == '#');
-        if !self.eat("\"") {
-            return Ok(Value::Word(self.run(word_char).to_string()));
-        }
-        let end = format!("\"{hashes}");
-        match self.rest().find(&end) {
-            Some(len) => {
-                let text = self.rest()[..len].to_string();
-                self.at += len + end.len();
-                Ok(Value::Text(text))
-            }
-            None => Err(self.error(start..start + 2, "this text never ends").hint(format!("close it with {end}"))),
-        }
-    }
-}
-
-/// The value of an unsigned number as RON writes it: `1_000`, `1.5e3`, `0xff`, `2u8`, `0.5f32`.
-fn number(text: &str) -> Option<f64> {
-    let plain = text.replace('_', "");
-    for (prefix, radix) in [("0x", 16), ("0o", 8), ("0b", 2)] {
-        if let Some(digits) = plain.strip_prefix(prefix) {
-            return u128::from_str_radix(digits, radix).ok().map(|n| n as f64);
-        }
-    }
-    const SUFFIXES: [&str; 12] = ["u8", "i8", "u16", "i16", "u32", "i32", "u64", "i64", "u128", "i128", "f32", "f64"];
-    let digits = SUFFIXES.iter().find_map(|s| plain.strip_suffix(s)).unwrap_or(&plain);
-    // Rust would also read "infinity" and "nan".
-    digits.starts_with(|c: char| c.is_ascii_digit() || c == '.').then(|| digits.parse().ok())?
 }
 
 #[cfg(test)]

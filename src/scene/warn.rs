@@ -1,6 +1,6 @@
 //! What will render but will disappoint.
 
-use crate::scene::document::Judge;
+use crate::scene::meaning::Judge;
 use crate::scene::reader::Reader;
 use crate::scene::{Material, MeshSource, Object, Scene, Substance};
 use glam::DVec3;
