@@ -207,7 +207,9 @@ impl LookFlags {
                 let problem = Problem::new(Cause::Words, format!("--camera: there is no bookmark `{name}`"));
                 match (crate::problem::nearest(name, names.iter().copied()), names.is_empty()) {
                     (Some(near), _) => problem.hint(format!("did you mean `{near}`?")),
-                    (None, true) => problem.hint("the scene has none: add bookmarks: { \"name\": (eye: …, target: …) }"),
+                    (None, true) => {
+                        problem.hint("the scene has none: add bookmarks: { \"name\": (eye: …, target: …) }")
+                    }
                     (None, false) => problem.hint(format!("there is `{}`", names.join("`, `"))),
                 }
             })?;

@@ -224,7 +224,9 @@ impl Step for ReadBack {
         let bytes = run.host::<Gpu>().read_texture(texture)?;
         let pixels = bytes
             .chunks_exact(16)
-            .map(|texel| std::array::from_fn(|c| f32::from_le_bytes(texel[4 * c..4 * c + 4].try_into().expect("4 bytes"))))
+            .map(|texel| {
+                std::array::from_fn(|c| f32::from_le_bytes(texel[4 * c..4 * c + 4].try_into().expect("4 bytes")))
+            })
             .collect();
         Ok(Image { width: texture.shape.width, height: texture.shape.height, pixels })
     }

@@ -95,11 +95,7 @@ impl Frame<'_> {
     }
 
     /// How much of each lamp that casts shadows every pixel sees: an array of layers. None when no lamp does.
-    pub(crate) fn visibility(
-        &self,
-        plan: &mut Plan,
-        gbuffer: Slot<Images>,
-    ) -> Result<Option<Slot<Images>>, Problem> {
+    pub(crate) fn visibility(&self, plan: &mut Plan, gbuffer: Slot<Images>) -> Result<Option<Slot<Images>>, Problem> {
         let lamps = self.lamps();
         let Some(lights) = self.lights_bind() else { return Ok(None) };
         let mut layers = Vec::new();
@@ -277,7 +273,11 @@ fn views_from(samples: &[DVec3], corners: &[DVec3], size: u32) -> LightViews {
     let near = |s: DVec3| {
         let nearest = corners.iter().map(|c| c.distance(s)).fold(f64::INFINITY, f64::min);
         // Inside the casters' bounds the nearest of them may be very near.
-        if fits && nearest.is_finite() { (0.05 * nearest).max(1e-4 * extent) } else { 1e-3 * extent.max(f64::MIN_POSITIVE) }
+        if fits && nearest.is_finite() {
+            (0.05 * nearest).max(1e-4 * extent)
+        } else {
+            1e-3 * extent.max(f64::MIN_POSITIVE)
+        }
     };
     let perspective = |s: DVec3, view: DMat4, half_angle: f64| {
         let f = 1.0 / half_angle.tan();
@@ -301,8 +301,7 @@ fn views_from(samples: &[DVec3], corners: &[DVec3], size: u32) -> LightViews {
     // A little wider than a face, so that the filter finds its neighbours there.
     let half_angle = (1.0 + 6.0 / size as f64).atan();
     let faces = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
-    let views =
-        samples.iter().flat_map(|s| faces.map(|face| perspective(*s, look_along(face), half_angle))).collect();
+    let views = samples.iter().flat_map(|s| faces.map(|face| perspective(*s, look_along(face), half_angle))).collect();
     LightViews { views, per_sample: 6, size }
 }
 

@@ -114,10 +114,12 @@ impl<'a> Frame<'a> {
             let (_, rotation, translation) = full.to_scale_rotation_translation();
             // A mirroring scale is in the mesh, with its sign; the decomposition may have put it elsewhere.
             let rotation = match object.transform.scale.cmplt(DVec3::ZERO).any() {
-                true => crate::scene::Transform { scale: DVec3::ONE, ..object.transform.clone() }
-                    .world_from_object()
-                    .to_scale_rotation_translation()
-                    .1,
+                true => {
+                    crate::scene::Transform { scale: DVec3::ONE, ..object.transform.clone() }
+                        .world_from_object()
+                        .to_scale_rotation_translation()
+                        .1
+                }
                 false => rotation,
             };
             let world_from_object = DAffine3::from_rotation_translation(rotation, translation);
@@ -219,7 +221,10 @@ impl<'a> Frame<'a> {
                 || outside(|p| p.w < 0.0);
             if out && self.view.skip {
                 item.in_view = false;
-                plan.skip(format!("drawing `{}`, and the bakes that only its own look needs", item.name), "outside the view");
+                plan.skip(
+                    format!("drawing `{}`, and the bakes that only its own look needs", item.name),
+                    "outside the view",
+                );
             }
         }
     }
@@ -325,13 +330,17 @@ impl<'a> Frame<'a> {
             binds.push(("textures", Bind::Texture(textures, 0)));
             binds.push(("repeat", Bind::Sampler(crate::gpu::Sampler::LinearRepeat)));
         }
-        let draws = self.draws(plan, |_| true, |plan, item| {
-            let mut streams = vec![shape::upload(plan, item.mesh, Stream::Normals)];
-            if textures.is_some() {
-                streams.push(shape::upload(plan, item.mesh, Stream::Uvs));
-            }
-            streams
-        });
+        let draws = self.draws(
+            plan,
+            |_| true,
+            |plan, item| {
+                let mut streams = vec![shape::upload(plan, item.mesh, Stream::Normals)];
+                if textures.is_some() {
+                    streams.push(shape::upload(plan, item.mesh, Stream::Uvs));
+                }
+                streams
+            },
+        );
         let drawn = draws.len();
         Ok(plan.add(Raster {
             name: "frame.gbuffer",

@@ -154,7 +154,10 @@ impl Step for SkyLight {
             .enumerate()
             .map(|(k, direction)| {
                 let cell = cells.as_ref().map_or(DVec3::ONE, |cells| cells[k].as_dvec3());
-                tables::Direction { direction: direction.as_vec3(), light: (solid_angle * cell * self.radiance).as_vec3() }
+                tables::Direction {
+                    direction: direction.as_vec3(),
+                    light: (solid_angle * cell * self.radiance).as_vec3(),
+                }
             })
             .collect();
         let mut bytes = encase::StorageBuffer::new(Vec::new());
@@ -274,7 +277,9 @@ fn lobe_mean(sky: &Texture, normal: DVec3, alpha: f64) -> DVec3 {
 fn shrunk(image: &Texture, width: u32) -> Texture {
     let width = width.min(image.width);
     let height = (width / 2).max(1).min(image.height);
-    let range = |i: u32, to: u32, from: u32| (i as u64 * from as u64 / to as u64)..((i as u64 + 1) * from as u64).div_ceil(to as u64);
+    let range = |i: u32, to: u32, from: u32| {
+        (i as u64 * from as u64 / to as u64)..((i as u64 + 1) * from as u64).div_ceil(to as u64)
+    };
     let texels = (0..width * height)
         .into_par_iter()
         .map(|i| {
@@ -364,7 +369,8 @@ impl Step for UploadAlbedos {
                 None => zeros.clone(),
             })
             .collect();
-        let shape = Shape::array((ALBEDO_TABLE as u32, ALBEDO_TABLE as u32), self.tables.len() as u32, Format::R16Float);
+        let shape =
+            Shape::array((ALBEDO_TABLE as u32, ALBEDO_TABLE as u32), self.tables.len() as u32, Format::R16Float);
         Ok(Images(vec![run.host::<Gpu>().texture_with(shape, bytemuck::cast_slice(&halves))]))
     }
 }
@@ -419,8 +425,7 @@ impl Frame<'_> {
     }
 
     fn sky_light(&self, plan: &mut Plan, surroundings: &Surroundings) -> Slot<Buffer> {
-        let cells =
-            surroundings.image.map(|image| plan.bake(SkyCells { image, rotation: surroundings.rotation }));
+        let cells = surroundings.image.map(|image| plan.bake(SkyCells { image, rotation: surroundings.rotation }));
         plan.add(SkyLight { radiance: surroundings.radiance, cells })
     }
 
@@ -474,10 +479,7 @@ impl Frame<'_> {
             output: ("openness", 16),
             over,
             over_stride: 12,
-            binds: vec![
-                ("directions", Bind::Buffer(light)),
-                ("visible", Bind::Buffer(visible)),
-            ],
+            binds: vec![("directions", Bind::Buffer(light)), ("visible", Bind::Buffer(visible))],
         })))
     }
 
@@ -488,8 +490,7 @@ impl Frame<'_> {
         blurred: bool,
     ) -> Option<(Vec<&'static str>, Vec<(&'static str, Bind)>)> {
         let surroundings = self.surroundings(plan)?;
-        let sky =
-            tables::Sky { radiance: surroundings.radiance.as_vec3(), rotation: surroundings.rotation as f32 };
+        let sky = tables::Sky { radiance: surroundings.radiance.as_vec3(), rotation: surroundings.rotation as f32 };
         let mut flags = vec!["ENVIRONMENT"];
         let mut binds = vec![("sky", Bind::uniform(&sky))];
         if let Some(image) = surroundings.image {

@@ -1,7 +1,10 @@
 use crate::geometry::mesh::Mesh;
 use crate::problem::{Problem, Tick};
 #[derive(Clone, Copy)]
-pub enum Figure { Hare, Bust }
+pub enum Figure {
+    Hare,
+    Bust,
+}
 pub fn sculpture(_: Figure, height: f64, _: u32, _: Tick) -> Result<Mesh, Problem> {
-    Ok(crate::geometry::shapes::sphere(0.5*height, 5))
+    Ok(crate::geometry::shapes::sphere(0.5 * height, 5))
 }

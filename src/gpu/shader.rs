@@ -170,7 +170,9 @@ impl Shaders {
         }
         match open.is_empty() {
             true => Ok(()),
-            false => Err(Problem::files("an #if is never closed").at(At::span(&file, &source, 0..0)).hint("add #endif")),
+            false => {
+                Err(Problem::files("an #if is never closed").at(At::span(&file, &source, 0..0)).hint("add #endif"))
+            }
         }
     }
 }

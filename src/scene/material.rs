@@ -23,7 +23,7 @@ pub struct Material {
     pub medium: Substance,
     /// Of the light that enters at normal incidence, the share that leaves again: that of the medium under its boundary,
     /// or of the paint.
-    pub albedo: DVec3,
+    pub albedo: Rgb,
     /// How the file spelled the medium.
     pub spelled: MediumSpec,
     pub phase: Phase,

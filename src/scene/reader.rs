@@ -165,7 +165,12 @@ impl Reader {
         let read = named(&self.files, node, name).and_then(|file| {
             let read = self.meshes.get(&file.key, || {
                 let (mesh, warnings) = read_obj(&file)?;
-                Ok(ReadMesh { closed: mesh.is_closed(), extent: mesh.bounds().size().max_element(), mesh: Arc::new(mesh), warnings })
+                Ok(ReadMesh {
+                    closed: mesh.is_closed(),
+                    extent: mesh.bounds().size().max_element(),
+                    mesh: Arc::new(mesh),
+                    warnings,
+                })
             });
             Ok((read.map_err(|problem| at_its_name(problem, node))?, file))
         });

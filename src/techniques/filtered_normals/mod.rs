@@ -127,7 +127,10 @@ impl Step for NeighbourNormals {
     }
     fn about(&self) -> String {
         match self.kernel.sigma_tr > 0.0 {
-            true => format!("normals averaged over neighbours, weights falling by e in {:.3} mm", 1.0 / self.kernel.sigma_tr),
+            true => format!(
+                "normals averaged over neighbours, weights falling by e in {:.3} mm",
+                1.0 / self.kernel.sigma_tr
+            ),
             false => "normals averaged over all neighbours alike".into(),
         }
     }
