@@ -10,6 +10,7 @@ use crate::scene::{
     Transform, ViewSettings,
 };
 use glam::DVec3;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Neither a picture nor a mesh may ask for more memory than machines have.
@@ -27,10 +28,10 @@ pub fn build(file: &SceneFile, reader: &Reader, judge: &mut Judge<'_>) -> Option
         }
         camera(&path, bookmark, judge);
     }
-    let mut names = Vec::new();
+    let mut names = BTreeSet::new();
     let lights: Vec<_> =
         file.lights.iter().enumerate().map(|(i, light)| self::light(i, light, reader, &mut names, judge)).collect();
-    let mut names = Vec::new();
+    let mut names = BTreeSet::new();
     let objects: Vec<_> =
         file.objects.iter().enumerate().map(|(i, object)| self::object(i, object, reader, &mut names, judge)).collect();
     let view = view(file, judge);
@@ -74,7 +75,16 @@ fn camera(path: &str, camera: &Camera, judge: &mut Judge<'_>) {
     }
 }
 
-fn light(i: usize, spec: &LightSpec, reader: &Reader, names: &mut Vec<String>, judge: &mut Judge<'_>) -> Option<Light> {
+fn light(
+    i: usize,
+    spec: &LightSpec,
+    reader: &Reader,
+    names: &mut BTreeSet<String>,
+    judge: &mut Judge<'_>,
+) -> Option<Light> {
+    if judge.full() {
+        return None;
+    }
     let path = format!("lights[{i}]");
     let at = |field: &str| join(&path, field);
     const AMOUNT: &str = "0 or more in each channel";
@@ -153,9 +163,12 @@ fn object(
     i: usize,
     spec: &ObjectSpec,
     reader: &Reader,
-    names: &mut Vec<String>,
+    names: &mut BTreeSet<String>,
     judge: &mut Judge<'_>,
 ) -> Option<Object> {
+    if judge.full() {
+        return None;
+    }
     let path = format!("objects[{i}]");
     let at = |field: &str| join(&path, field);
     let name = spec.name.clone().unwrap_or_else(|| object_name(i));

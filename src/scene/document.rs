@@ -139,6 +139,21 @@ pub fn named(files: &Files, node: &Node, path: &str) -> Result<File, Problem> {
     files.read(&full).map_err(|e| unreadable(&full, &e).at(node.at()))
 }
 
+/// Whether a problem stands in a text, or is one of a file as a whole.
+pub fn has_line(problem: &Problem) -> bool {
+    problem.at.as_ref().is_some_and(|at| at.line > 0)
+}
+
+/// A problem found in another file, told at the place that names that file.
+pub fn at_its_name(problem: Problem, node: &Node) -> Problem {
+    let place = match &problem.at {
+        Some(at) if at.line > 0 => format!("{}:{}:{}: ", at.file.display(), at.line, at.column),
+        Some(at) => format!("{}: ", at.file.display()),
+        None => String::new(),
+    };
+    Problem { what: format!("{place}{}", problem.what), ..problem }.at(node.at())
+}
+
 /// What to say of a file that cannot be read: why, where it was looked for, and what is there.
 fn unreadable(path: &Path, error: &std::io::Error) -> Problem {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -196,7 +211,8 @@ pub fn material(files: &Files, file: &File, fits: &dyn Fn(&Node) -> Result<(), P
         }
         chain.push(next.path.clone());
         // The base's own `base` leads on; the one that was just followed is done with.
-        let mut under = head_of(&next, fits)?;
+        let mut under =
+            head_of(&next, fits).map_err(|e| if has_line(&e) { e } else { at_its_name(e, &base).path("base") })?;
         if let Value::Struct(_, fields) = &mut tree.value {
             fields.retain(|f| f.name != "base");
         }

@@ -13,6 +13,7 @@ use crate::scene::path::join;
 use crate::scene::reader::Reader;
 use crate::store::Key;
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -180,10 +181,13 @@ fn layer_name(i: usize) -> String {
 
 /// Where each layer ends; `None` where that is wrong.
 fn depths(file: &MaterialFile, reader: &Reader, judge: &mut Judge<'_>) -> Vec<Option<Varying<f64>>> {
-    let mut names = Vec::new();
+    let mut names = BTreeSet::new();
     let mut deepest: Option<f64> = None;
     let mut out = Vec::new();
     for (i, layer) in file.layers.iter().enumerate() {
+        if judge.full() {
+            break;
+        }
         let path = format!("layers[{i}]");
         let LayerSpec { name, medium, depth, .. } = layer;
         let name = name.clone().unwrap_or_else(|| layer_name(i));
@@ -278,6 +282,9 @@ fn check_curve(curve: &Curve, judge: &mut Judge<'_>) {
     }
     let mut last = -1.0;
     for (i, (omega, _)) in curve.points.iter().enumerate() {
+        if judge.full() {
+            break;
+        }
         let path = format!("filter.points[{i}].0");
         judge.all(&path, &[*omega], |v| v >= 0.0, "rad/mm, 0 or more");
         if *omega >= 0.0 && *omega <= last {
@@ -285,14 +292,4 @@ fn check_curve(curve: &Curve, judge: &mut Judge<'_>) {
         }
         last = last.max(*omega);
     }
-}
-
-/// A `Problem` found in another file, told at the place that names that file.
-pub fn at_its_name(problem: Problem, node: &crate::scene::tree::Node) -> Problem {
-    let place = match &problem.at {
-        Some(at) if at.line > 0 => format!("{}:{}:{}: ", at.file.display(), at.line, at.column),
-        Some(at) => format!("{}: ", at.file.display()),
-        None => String::new(),
-    };
-    Problem { what: format!("{place}{}", problem.what), ..problem }.at(node.at())
 }

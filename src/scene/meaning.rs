@@ -4,6 +4,10 @@ use crate::problem::Problem;
 use crate::scene::de::suggest;
 use crate::scene::path::join;
 use crate::scene::tree::{Node, Value};
+use std::collections::BTreeSet;
+
+/// Nobody reads more, and each costs a look at the whole text.
+const MOST: usize = 100;
 
 /// What is wrong with what the files mean: found all at once, each thing at its place.
 pub struct Judge<'a> {
@@ -18,6 +22,7 @@ impl<'a> Judge<'a> {
         root.walk("", &mut |path, node| {
             if let Value::Number(n) = node.value
                 && !n.is_finite()
+                && !judge.full()
             {
                 judge.problems.push(
                     Problem::files(format!("{} is not a finite number", node.text()))
@@ -28,6 +33,10 @@ impl<'a> Judge<'a> {
             }
         });
         judge
+    }
+    /// Whether there are so many problems that looking for more would help nobody.
+    pub fn full(&self) -> bool {
+        self.problems.len() >= MOST
     }
     pub fn node(&self, path: &str) -> &'a Node {
         self.root.nearest(path)
@@ -50,7 +59,7 @@ impl<'a> Judge<'a> {
 
     /// That each of `values` is `allowed`; what is not finite was said already.
     pub fn all(&mut self, path: &str, values: &[f64], allowed: impl Fn(f64) -> bool, range: &str) {
-        if values.iter().all(|v| v.is_finite()) && !values.iter().all(|v| allowed(*v)) {
+        if !self.full() && values.iter().all(|v| v.is_finite()) && !values.iter().all(|v| allowed(*v)) {
             // One number of several is marked by itself where it is written by itself.
             let member = values.iter().position(|v| !allowed(*v)).map(|i| format!("{path}.{i}"));
             let place = match member.filter(|m| values.len() > 1 && self.root.get(m).is_some()) {
@@ -63,13 +72,12 @@ impl<'a> Judge<'a> {
         }
     }
     /// That a name is not empty and not among `seen`.
-    pub fn name(&mut self, path: &str, name: &str, seen: &mut Vec<String>) {
+    pub fn name(&mut self, path: &str, name: &str, seen: &mut BTreeSet<String>) {
         if name.trim().is_empty() {
             self.wrong(&join(path, "name"), "a name cannot be empty", "give it a name: messages and --set use it");
-        } else if seen.iter().any(|s| s == name) {
+        } else if !seen.insert(name.to_string()) {
             self.wrong(&join(path, "name"), format!("`{name}` is the name of another one too"), "choose another name");
         }
-        seen.push(name.to_string());
     }
     /// That `word`, in the brackets of the value at `path`, is one of `known`.
     pub fn known(&mut self, path: &str, word: &str, what: &str, known: &[&str]) {

@@ -25,8 +25,7 @@ mod tree;
 mod warn;
 
 #[cfg(test)]
-#[path = "tests.rs"]
-mod room_tests;
+mod tests;
 
 pub use document::Kind;
 pub use fields::Triple;
@@ -244,19 +243,5 @@ pub struct ReferenceSettings {
 impl Default for ReferenceSettings {
     fn default() -> ReferenceSettings {
         ReferenceSettings { max_error: 0.02, max_spp: 4096, max_depth: 512, seed: 1 }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rotation_is_about_the_fixed_x_then_y_then_z_axis() {
-        let turn = |deg: DVec3| Transform { translate: DVec3::X, rotate_deg: deg, scale: DVec3::splat(2.0) };
-        let to = |deg: [f64; 3], p: DVec3| turn(DVec3::from(deg)).world_from_object().transform_point3(p);
-        assert!(to([90.0, 90.0, 0.0], DVec3::Y).distance(DVec3::new(3.0, 0.0, 0.0)) < 1e-12);
-        assert!(to([0.0, 90.0, 90.0], DVec3::X).distance(DVec3::new(1.0, 0.0, -2.0)) < 1e-12);
-        assert!(to([90.0, 0.0, 90.0], DVec3::Y).distance(DVec3::new(1.0, 0.0, 2.0)) < 1e-12);
     }
 }

@@ -9,19 +9,49 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The steps of a path: `objects[0].name` and `objects.0.name` are `objects`, `0`, `name`.
-fn steps(path: &str) -> Vec<String> {
+/// One step of a path.
+#[derive(Clone, Debug)]
+enum Step {
+    /// `[0]`
+    Index(usize),
+    /// `.name`, `["name"]`, or `.0`, which is a number only where nothing has it as its name.
+    Name(String),
+}
+
+impl Step {
+    fn name(&self) -> String {
+        match self {
+            Step::Index(i) => i.to_string(),
+            Step::Name(name) => name.clone(),
+        }
+    }
+    fn number(&self) -> Option<usize> {
+        match self {
+            Step::Index(i) => Some(*i),
+            Step::Name(name) => name.parse().ok(),
+        }
+    }
+    fn is(&self, word: &str) -> bool {
+        matches!(self, Step::Name(name) if name == word)
+    }
+}
+
+fn steps(path: &str) -> Vec<Step> {
     let mut out = Vec::new();
     let mut rest = path;
     while !rest.is_empty() {
         if let Some(quoted) = rest.strip_prefix("[\"") {
             let (key, after) = quoted.split_once("\"]").unwrap_or((quoted, ""));
-            out.push(key.to_string());
+            out.push(Step::Name(key.to_string()));
             rest = after;
         } else {
+            let bracket = rest.starts_with('[');
             let bare = rest.trim_start_matches(['.', '[']);
             let end = bare.find(['.', '[', ']']).unwrap_or(bare.len());
-            out.push(bare[..end].to_string());
+            out.push(match bare[..end].parse() {
+                Ok(i) if bracket => Step::Index(i),
+                _ => Step::Name(bare[..end].to_string()),
+            });
             rest = bare[end..].trim_start_matches(']');
         }
     }
@@ -34,14 +64,14 @@ pub fn join(path: &str, name: &str) -> String {
 }
 
 impl Node {
-    fn member(&self, step: &str) -> Option<&Node> {
+    fn member(&self, step: &Step) -> Option<&Node> {
         match &self.value {
-            Value::Struct(_, fields) => fields.iter().find(|f| f.name == step).map(|f| &f.value),
+            Value::Struct(_, fields) => fields.iter().find(|f| step.is(&f.name)).map(|f| &f.value),
             Value::List(items) => position(items, step).map(|i| &items[i]),
-            Value::Map(items) => items.iter().find(|(k, _)| key(k) == step).map(|(_, v)| v),
-            Value::Tuple(_, items) => match step.parse() {
-                Ok(i) => items.get::<usize>(i),
-                Err(_) => items.first().filter(|_| items.len() == 1)?.member(step),
+            Value::Map(items) => items.iter().find(|(k, _)| step.is(key(k))).map(|(_, v)| v),
+            Value::Tuple(_, items) => match step.number() {
+                Some(i) => items.get(i),
+                None => items.first().filter(|_| items.len() == 1)?.member(step),
             },
             _ => None,
         }
@@ -96,7 +126,7 @@ impl Node {
     }
 
     /// Puts `value` at `path`, adding the field when it is not there. `at` is the place to complain about.
-    fn set(&mut self, path: &[String], done: &mut String, value: Node, flag: &Flag) -> Result<(), Problem> {
+    fn set(&mut self, path: &[Step], done: &mut String, value: Node, flag: &Flag) -> Result<(), Problem> {
         let Some((step, rest)) = path.split_first() else {
             *self = value;
             return Ok(());
@@ -112,17 +142,17 @@ impl Node {
         let parent = std::mem::take(done);
         match &mut self.value {
             Value::Struct(_, fields) => {
-                *done = join(&parent, step);
-                let i = fields.iter().position(|f| f.name == *step).unwrap_or_else(|| {
-                    fields.push(flag.field(step));
+                *done = join(&parent, &step.name());
+                let i = fields.iter().position(|f| step.is(&f.name)).unwrap_or_else(|| {
+                    fields.push(flag.field(&step.name()));
                     fields.len() - 1
                 });
                 fields[i].value.set(rest, done, value, flag)
             }
             Value::Map(items) => {
-                let _ = write!(done, "{parent}[{step:?}]");
-                let i = items.iter().position(|(k, _)| key(k) == step).unwrap_or_else(|| {
-                    items.push((flag.text(step), flag.empty()));
+                let _ = write!(done, "{parent}[{:?}]", step.name());
+                let i = items.iter().position(|(k, _)| step.is(key(k))).unwrap_or_else(|| {
+                    items.push((flag.text(&step.name()), flag.empty()));
                     items.len() - 1
                 });
                 items[i].1.set(rest, done, value, flag)
@@ -132,20 +162,20 @@ impl Node {
                     let _ = write!(done, "{parent}[{i}]");
                     items[i].set(rest, done, value, flag)
                 }
-                None => Err(flag.no_member(&parent, step, items)),
+                None => Err(flag.no_member(&parent, &step.name(), items)),
             },
-            Value::Tuple(_, items) => match step.parse::<usize>() {
-                Ok(i) if i < items.len() => {
+            Value::Tuple(_, items) => match step.number() {
+                Some(i) if i < items.len() => {
                     let _ = write!(done, "{parent}.{i}");
                     items[i].set(rest, done, value, flag)
                 }
-                Err(_) if items.len() == 1 => {
+                None if items.len() == 1 => {
                     *done = parent;
                     items[0].set(path, done, value, flag)
                 }
-                _ => Err(flag.problem(format!("`{parent}` has no member `{step}`"))),
+                _ => Err(flag.problem(format!("`{parent}` has no member `{}`", step.name()))),
             },
-            _ => Err(flag.problem(format!("`{parent}` is a single value and has no field `{step}`"))),
+            _ => Err(flag.problem(format!("`{parent}` is a single value and has no field `{}`", step.name()))),
         }
     }
 
@@ -173,9 +203,12 @@ fn name_of(node: &Node) -> Option<&str> {
     }
 }
 
-fn position(items: &[Node], step: &str) -> Option<usize> {
-    let named = items.iter().position(|n| name_of(n) == Some(step));
-    named.or_else(|| step.parse().ok().filter(|i| *i < items.len()))
+fn position(items: &[Node], step: &Step) -> Option<usize> {
+    let named = match step {
+        Step::Index(_) => None,
+        Step::Name(name) => items.iter().position(|n| name_of(n) == Some(name)),
+    };
+    named.or(step.number()).filter(|i| *i < items.len())
 }
 
 /// The words `--set PATH=RON`.

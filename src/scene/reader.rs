@@ -1,8 +1,8 @@
 //! Reads scenes and materials, and remembers what was costly: meshes and images of the same content are read once.
 
 use crate::problem::{Problem, Problems};
-use crate::scene::document::{self, Kind, check_head, named, typed};
-use crate::scene::material::{at_its_name, build as build_material, complete};
+use crate::scene::document::{self, Kind, at_its_name, check_head, has_line, named, typed};
+use crate::scene::material::{build as build_material, complete};
 use crate::scene::material_file::MaterialFile;
 use crate::scene::meaning::Judge;
 use crate::scene::outside::{Encoding, Mesh, Texture, decode, read_obj};
@@ -148,10 +148,9 @@ impl Reader {
                 material.map(Arc::new)
             }
             Err(problem) => {
-                judge.problems.push(if problem.at.as_ref().is_some_and(|at| at.line == 0) {
-                    at_its_name(problem, judge.node(path)).path(path)
-                } else {
-                    problem
+                judge.problems.push(match has_line(&problem) {
+                    true => problem,
+                    false => at_its_name(problem, judge.node(path)).path(path),
                 });
                 None
             }

@@ -3,8 +3,9 @@
 use crate::problem::{Problem, Problems};
 use crate::scene::document::{self, Kind, parse};
 use crate::scene::tree::{Node, Source, Value};
-use crate::scene::{Filter, LightKind, Material, MeshSource, Reader, Scene, Sky, Substance, Varying};
+use crate::scene::{Filter, LightKind, Material, MeshSource, Reader, Scene, Sky, Substance, Transform, Varying};
 use crate::store::Files;
+use glam::DVec3;
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -63,6 +64,15 @@ fn every_mistake_is_told_in_the_expected_words() {
         }
     }
     assert!(wrong.is_empty(), "{wrong}UPDATE=1 rewrites what is expected");
+}
+
+#[test]
+fn rotation_is_about_the_fixed_x_then_y_then_z_axis() {
+    let turn = |deg: DVec3| Transform { translate: DVec3::X, rotate_deg: deg, scale: DVec3::splat(2.0) };
+    let to = |deg: [f64; 3], p: DVec3| turn(DVec3::from(deg)).world_from_object().transform_point3(p);
+    assert!(to([90.0, 90.0, 0.0], DVec3::Y).distance(DVec3::new(3.0, 0.0, 0.0)) < 1e-12);
+    assert!(to([0.0, 90.0, 90.0], DVec3::X).distance(DVec3::new(1.0, 0.0, -2.0)) < 1e-12);
+    assert!(to([90.0, 0.0, 90.0], DVec3::Y).distance(DVec3::new(1.0, 0.0, 2.0)) < 1e-12);
 }
 
 const FULL: &str = r#"// Every field.
@@ -261,6 +271,18 @@ fn settings_of_a_technique_are_read_with_their_places() {
     assert_eq!((error.at.unwrap().column, error.what.as_str()), (11, "there is no field `layer`"));
     assert_eq!(of("LongRange(layers: 0)").problem("layers", "x").at.unwrap().column, 19);
     assert_eq!(of("LongRang()").unknown(&["LongRange"]).hint.unwrap(), "did you mean `LongRange`?");
+}
+
+#[test]
+fn a_file_with_a_hundred_thousand_mistakes_is_told_the_first() {
+    let many = |object: &str| format!("Scene(version: 1, mm_per_unit: 1, objects: [{}])", object.repeat(100_000));
+    for text in
+        [many("(name: \"\"),"), many("(transform: (scale: NaN)),"), many("(name: \"a\", material: \"no.ron\"),")]
+    {
+        let Problems(problems) = scene(&text).unwrap_err();
+        assert!(problems.len() > 50 && problems.len() < 200);
+    }
+    assert_eq!(scene(&many("(name: \"a\", visible: 3),")).unwrap_err().0.len(), 1);
 }
 
 /// Files of which every part is well spelled.

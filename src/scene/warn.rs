@@ -38,6 +38,9 @@ pub fn material(material: &Material, judge: &mut Judge<'_>) {
 /// What can be said of a scene once its materials are known.
 pub fn scene(scene: &Scene, reader: &Reader, judge: &mut Judge<'_>) {
     for (i, object) in scene.objects.iter().enumerate() {
+        if judge.full() {
+            break;
+        }
         let Some(medium) = object.material.medium.medium().filter(|_| object.visible) else { continue };
         if let MeshSource::File { key, .. } = &object.mesh
             && !reader.is_closed(key)
