@@ -43,9 +43,9 @@ impl Frame<'_> {
             flags.push("SHADOWS");
             binds.push(("visibility", Bind::Texture(visibility, 0)));
         }
-        if let Some((sky_flags, sky_binds)) = sky {
-            flags.extend(sky_flags);
-            binds.extend(sky_binds);
+        if let Some(sky) = sky {
+            flags.extend(sky.flags);
+            binds.extend(sky.binds);
             binds.push(("albedo_table", Bind::Texture(self.gloss_albedos(plan), 0)));
             binds.push(("linear", Bind::Sampler(Sampler::Linear)));
         }
@@ -164,9 +164,9 @@ impl Frame<'_> {
         }
         if self.view.part.has(Part::Unscattered) {
             flags.push("UNSCATTERED");
-            if let Some((sky_flags, sky_binds)) = self.sky_binds(plan, false) {
-                flags.extend(sky_flags);
-                binds.extend(sky_binds);
+            if let Some(sky) = self.sky_binds(plan, false) {
+                flags.extend(sky.flags);
+                binds.extend(sky.binds);
                 if let Some(through) = self.depth_through(plan)? {
                     flags.push("THROUGH");
                     binds.push(("depth_through", Bind::Texture(through, 0)));

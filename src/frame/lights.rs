@@ -263,13 +263,15 @@ fn views_from(samples: &[DVec3], corners: &[DVec3], size: u32) -> LightViews {
     let high = corners.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
     let center = 0.5 * (low + high);
     let extent = (high - low).length();
-    // The widest angle between the way to the centre and the way to a corner, over all samples.
+    // The widest angle between the way to the centre and the way to a corner, over all samples; what is at the light
+    // itself has no direction, and lies all around it.
     let widest = samples
         .iter()
         .flat_map(|s| corners.iter().map(move |c| (center - *s).angle_between(*c - *s)))
+        .map(|angle| if angle.is_nan() { std::f64::consts::PI } else { angle })
         .fold(0.0, f64::max);
-    // A frustum beyond this half angle wastes most of its texels on its rim; a corner at the light itself has no angle.
-    let fits = corners.is_empty() || (widest.is_finite() && widest < 60f64.to_radians());
+    // A frustum beyond this half angle wastes most of its texels on its rim.
+    let fits = corners.is_empty() || widest < 60f64.to_radians();
     let near = |s: DVec3| {
         let nearest = corners.iter().map(|c| c.distance(s)).fold(f64::INFINITY, f64::min);
         // Inside the casters' bounds the nearest of them may be very near.

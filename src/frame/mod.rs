@@ -112,16 +112,6 @@ impl<'a> Frame<'a> {
             let (min, max) = shape::bounds(object);
             let full = object.transform.world_from_object();
             let (_, rotation, translation) = full.to_scale_rotation_translation();
-            // A mirroring scale is in the mesh, with its sign; the decomposition may have put it elsewhere.
-            let rotation = match object.transform.scale.cmplt(DVec3::ZERO).any() {
-                true => {
-                    crate::scene::Transform { scale: DVec3::ONE, ..object.transform.clone() }
-                        .world_from_object()
-                        .to_scale_rotation_translation()
-                        .1
-                }
-                false => rotation,
-            };
             let world_from_object = DAffine3::from_rotation_translation(rotation, translation);
             items.push(Item {
                 name: object.name.clone(),

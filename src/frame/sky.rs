@@ -24,6 +24,12 @@ use std::f64::consts::PI;
 /// Directions in which the sky is looked for.
 const DIRECTIONS: usize = 256;
 
+/// What a pass that looks at the sky needs: flags and bindings of `frame/sky.wgsl`.
+pub(super) struct SkyBinds {
+    pub flags: Vec<&'static str>,
+    pub binds: Vec<(&'static str, Bind)>,
+}
+
 /// The surroundings of a scene, planned.
 pub(super) struct Surroundings {
     radiance: DVec3,
@@ -483,12 +489,8 @@ impl Frame<'_> {
         })))
     }
 
-    /// The flags and bindings of `frame/sky.wgsl`, for passes that look at the sky (`blurred`: as rough things mirror it).
-    pub(super) fn sky_binds(
-        &self,
-        plan: &mut Plan,
-        blurred: bool,
-    ) -> Option<(Vec<&'static str>, Vec<(&'static str, Bind)>)> {
+    /// For passes that look at the sky (`blurred`: as rough things mirror it).
+    pub(super) fn sky_binds(&self, plan: &mut Plan, blurred: bool) -> Option<SkyBinds> {
         let surroundings = self.surroundings(plan)?;
         let sky = tables::Sky { radiance: surroundings.radiance.as_vec3(), rotation: surroundings.rotation as f32 };
         let mut flags = vec!["ENVIRONMENT"];
@@ -503,7 +505,7 @@ impl Frame<'_> {
                 binds.push(("sky_blurred", Bind::Texture(plan.add(UploadBlurred { texels }), 0)));
             }
         }
-        Some((flags, binds))
+        Some(SkyBinds { flags, binds })
     }
 
     /// How much each item's boundary mirrors, by angle and roughness.
