@@ -31,6 +31,11 @@ pub fn build(file: &SceneFile, reader: &Reader, judge: &mut Judge<'_>) -> Option
     let mut names = BTreeSet::new();
     let lights: Vec<_> =
         file.lights.iter().enumerate().map(|(i, light)| self::light(i, light, reader, &mut names, judge)).collect();
+    let surroundings = |spec: &LightSpec| matches!(spec, LightSpec::Environment(l) if l.enabled);
+    for (i, _) in file.lights.iter().enumerate().filter(|(_, spec)| surroundings(spec)).skip(1) {
+        let hint = "switch one of them off with `enabled: false`, or paint both into one image";
+        judge.wrong(&format!("lights[{i}]"), "a second environment is switched on: there is one sky", hint);
+    }
     let mut names = BTreeSet::new();
     let objects: Vec<_> =
         file.objects.iter().enumerate().map(|(i, object)| self::object(i, object, reader, &mut names, judge)).collect();
@@ -320,7 +325,7 @@ fn view(file: &SceneFile, judge: &mut Judge<'_>) -> Option<ViewSettings> {
     );
     let technique = match judge.root.get("view.technique") {
         Some(_) => technique("view.technique", judge)?,
-        None => TechniqueText::from_flag("default", "Auto").expect("a name is a technique"),
+        None => TechniqueText::from_flag("default", "FilteredNormals()").expect("a name is a technique"),
     };
     Some(ViewSettings {
         technique,

@@ -109,7 +109,7 @@ spec! { TransformSpec as "Transform" {
     scale: Triple = Triple::all(1.0),
 } }
 spec! { ViewSpec as "View" {
-    technique: Raw = Raw("Auto".to_string()),
+    technique: Raw = Raw("FilteredNormals()".to_string()),
     size: (u32, u32) = (960, 540),
     exposure_ev: f64 = 0.0,
     tone: Tone = Tone::Srgb,
