@@ -50,6 +50,8 @@ pub struct Layer {
 #[derive(Serialize)]
 pub struct Raster {
     pub name: &'static str,
+    /// For people: no part of the pass's name.
+    #[serde(skip)]
     pub about: String,
     pub shader: Shader,
     pub size: (u32, u32),
@@ -65,6 +67,8 @@ pub struct Raster {
 #[derive(Serialize)]
 pub struct Fullscreen {
     pub name: &'static str,
+    /// For people: no part of the pass's name.
+    #[serde(skip)]
     pub about: String,
     pub shader: Shader,
     pub size: (u32, u32),
@@ -77,6 +81,8 @@ pub struct Fullscreen {
 #[derive(Serialize)]
 pub struct Compute {
     pub name: &'static str,
+    /// For people: no part of the pass's name.
+    #[serde(skip)]
     pub about: String,
     pub shader: Shader,
     /// The name of the shader's output, and the bytes of one of its elements.
