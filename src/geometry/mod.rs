@@ -8,5 +8,7 @@ pub mod deform;
 pub mod mesh;
 pub mod neighbours;
 pub mod normals;
+pub mod obj;
+mod polygon;
 pub mod shapes;
 pub mod visibility;
