@@ -10,5 +10,6 @@ pub mod neighbours;
 pub mod normals;
 pub mod obj;
 mod polygon;
+pub mod sculpture;
 pub mod shapes;
 pub mod visibility;
