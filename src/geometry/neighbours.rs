@@ -351,7 +351,7 @@ mod tests {
         let n = mesh.positions.len() as u32;
         let mut shuffled = Mesh { triangles: vec![], ..mesh.clone() };
         // 7 and n have no common divisor: a permutation.
-        assert!(n % 7 != 0);
+        assert!(!n.is_multiple_of(7));
         let to = |v: u32| (7 * v + 3) % n;
         for v in 0..n as usize {
             shuffled.positions[to(v as u32) as usize] = mesh.positions[v];

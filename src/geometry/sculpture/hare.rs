@@ -56,7 +56,7 @@ impl Hare {
         let skull = round_cone(narrow(p), (dvec3(0.0, 1.2, -1.8), 7.6), (dvec3(0.0, -2.6, 8.6), 5.0));
         let cheek = ellipsoid(m, dvec3(3.4, -4.0, 1.5), dvec3(4.0, 5.0, 6.8));
         let pad = ellipsoid(m, dvec3(1.9, -4.3, 11.6), dvec3(2.8, 2.6, 3.2));
-        let chin = ellipsoid(p, dvec3(0.0, -7.2, 9.2), dvec3(2.5, 1.9, 3.2));
+        let chin = ellipsoid(p, dvec3(0.0, -6.9, 9.2), dvec3(2.6, 2.1, 3.4));
         let head = join(join(join(skull, cheek, 5.0), chin, 2.5), pad, 1.6);
 
         // The eye is large, stands out at the side and looks out from under a lid.

@@ -1,7 +1,7 @@
 //! The project's own figures, modelled as signed distance fields and meshed finely and evenly.
 //!
-//! A figure is a field over space (see [`clay`] for the vocabulary), negative inside. It is meshed in three steps:
-//! [`polygonise`] finds a closed surface through a lattice, [`remesh`] makes its triangles nearly equilateral while
+//! A figure is a field over space (see `clay` for the vocabulary), negative inside. It is meshed in three steps:
+//! `polygonise` finds a closed surface through a lattice, `remesh` makes its triangles nearly equilateral while
 //! keeping it on the field's zero set, and the normals are the field's gradient, so that they are as smooth as the clay.
 
 mod bust;

@@ -3,7 +3,7 @@ use crate::geometry::mesh::Topology;
 
 const FIGURES: [Figure; 2] = [Figure::Hare, Figure::Bust];
 
-/// A third of the default: a second in a debug build.
+/// A third of the default, to stay quick in a debug build.
 const DETAIL: u32 = 64;
 
 fn smallest_angles(mesh: &Mesh) -> Vec<f64> {
