@@ -41,7 +41,8 @@ impl Step for Shape {
                     scene::Figure::Hare => sculpture::Figure::Hare,
                     scene::Figure::Bust => sculpture::Figure::Bust,
                 };
-                sculpture::sculpture(figure, *height, *detail, &|share| run.tick(share))?
+                run.tick(0.0)?;
+                sculpture::sculpture(figure, *height, *detail)
             }
             MeshSource::File { .. } => unreachable!("a file's mesh is read with the scene"),
         })

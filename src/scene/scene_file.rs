@@ -139,4 +139,4 @@ spec! { TorusKnotSpec as "TorusKnot" {
     segments: (u32, u32) = (384, 48),
 } }
 spec! { SlabSpec as "Slab" { size: Triple = Triple::all(1.0), segments: (u32, u32) = (32, 32) } }
-spec! { SculptureSpec as "Sculpture" { figure: Figure = Figure::Hare, height: f64 = 1.0, detail: u32 = 120 } }
+spec! { SculptureSpec as "Sculpture" { figure: Figure = Figure::Hare, height: f64 = 1.0, detail: u32 = 190 } }
