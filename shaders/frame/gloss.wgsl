@@ -74,8 +74,9 @@ fn fragment(in: Vertex) -> @location(0) vec4f {
             let cos_in = dot(normal, light_in.direction);
             if cos_in > 0.0 {
                 let half_way = normalize(light_in.direction + to_eye);
-                // A sample stands for its cell of the light: the lobe is widened by what the cell subtends.
-                let widened = pow(pow(rough, 4.0) + 0.25 * light_in.spread * light_in.spread, 0.25);
+                // A sample stands for its cell of the light: the lobe is widened by what the cell subtends, so that the
+                // samples are not seen one by one.
+                let widened = pow(pow(rough, 4.0) + 0.6 * light_in.spread * light_in.spread, 0.25);
                 from_light += ggx_lobe(cos_in, cos_out, min(1.0, dot(normal, half_way)), min(1.0, widened))
                     * fresnel_dielectric(saturate(dot(half_way, to_eye)), object.eta)
                     * light_in.irradiance;

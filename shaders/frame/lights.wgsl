@@ -22,7 +22,7 @@ struct Incident {
     // On a plane that faces the light.
     irradiance: vec3f,
     distance: f32,
-    // Half the size of the sample, seen from the point, in radians.
+    // Half the longer side of the sample's cell, seen from the point, in radians.
     spread: f32,
 }
 
@@ -47,6 +47,6 @@ fn incident(light: Light, i: i32, point: vec3f) -> Incident {
     }
     let normal = cross(light.u, light.v); // its length is a quarter of the area
     let seen = max(0.0, -dot(normal, direction)) * 0.25 / (distance * distance);
-    let size = 0.25 * sqrt(length(normal));
+    let size = 0.25 * max(length(light.u), length(light.v));
     return Incident(direction, light.power * seen, distance, size / distance);
 }

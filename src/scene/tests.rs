@@ -148,7 +148,10 @@ fn a_full_scene_holds_what_its_file_says() {
 fn what_is_not_required_has_a_default() {
     let (scene, warnings) = scene("Scene(version: 1, mm_per_unit: 1)").unwrap();
     assert!(scene.objects.is_empty() && warnings.is_empty());
-    assert_eq!((scene.view.size, scene.view.antialias, scene.view.technique.ron.as_str()), ((960, 540), 2, "FilteredNormals()"));
+    assert_eq!(
+        (scene.view.size, scene.view.antialias, scene.view.technique.ron.as_str()),
+        ((960, 540), 2, "FilteredNormals()")
+    );
     let bare = r#"Scene(version: 1, mm_per_unit: 1, lights: [Environment(), Point()], objects: [(), ()])"#;
     let (bare, warnings) = self::scene(bare).unwrap();
     assert!(warnings.len() >= 4);
