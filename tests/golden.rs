@@ -91,7 +91,8 @@ fn first_light_is_the_golden_picture() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("wax.ron");
         std::fs::write(&file, longer).unwrap();
-        let mut session = Session::new(options(&[("objects.bowl.material", &format!("{:?}", file.display().to_string()))]));
+        let mut session =
+            Session::new(options(&[("objects.bowl.material", &format!("{:?}", file.display().to_string()))]));
         let other = decoded(&render(&mut session, &root.join("scenes/first-light.ron")));
         assert!(same(&other, &expected, software).is_err(), "a longer mean free path is not noticed");
     }

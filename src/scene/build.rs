@@ -284,7 +284,12 @@ fn mesh(path: &str, spec: &MeshSpec, reader: &Reader, judge: &mut Judge<'_>) -> 
         }
         MeshSpec::Sculpture(ref m) => {
             positive("height", &[m.height]);
-            judge.all(&at("detail"), &[m.detail.into()], |v| (32.0..=512.0).contains(&v), "cells along the height, from 32 to 512");
+            judge.all(
+                &at("detail"),
+                &[m.detail.into()],
+                |v| (32.0..=512.0).contains(&v),
+                "cells along the height, from 32 to 512",
+            );
             MeshSource::Sculpture { figure: m.figure, height: m.height, detail: m.detail }
         }
     };
