@@ -1,28 +1,22 @@
 //! Words → one library call → print. No logic.
 
-use clap::Parser;
-use diaphane::commands::Words;
+use diaphane::commands::{self, Said};
+use std::io::Write;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let words = Words::parse();
-    let json = words.wants_json();
-    match words.run() {
-        Ok(answer) => {
-            answer.talk.iter().for_each(|line| eprintln!("{line}"));
-            match json {
-                true => println!("{:#}", answer.json),
-                false => print!("{}", answer.text),
-            }
-            ExitCode::SUCCESS
-        }
-        Err(problems) => {
-            if json {
-                let all: Vec<_> = problems.0.iter().map(|problem| problem.json()).collect();
-                println!("{:#}", serde_json::json!({ "problems": all }));
-            }
-            eprintln!("{problems}");
-            ExitCode::from(problems.cause().exit_status())
-        }
+    // Mesa's choice of a device complains on stderr wherever there is no desktop.
+    if std::env::var_os("NODEVICE_SELECT").is_none() {
+        // SAFETY: this is the only thread yet, so nobody reads the environment meanwhile.
+        unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
+    }
+    std::panic::set_hook(Box::new(|panic| _ = writeln!(std::io::stderr(), "{}", commands::mistake(panic))));
+    let said = std::panic::catch_unwind(|| commands::answer(std::env::args_os()));
+    // The hook has said what there is to say.
+    let Said { facts, talk, status } = said.unwrap_or_else(|_| Said::unfinished());
+    let talked = talk.is_empty() || writeln!(std::io::stderr(), "{}", talk.trim_end()).is_ok();
+    match commands::print(&facts) {
+        Ok(()) if talked => ExitCode::from(status),
+        _ => ExitCode::from(status.max(Said::unfinished().status)),
     }
 }

@@ -210,7 +210,7 @@ pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
     known
         .into_iter()
         .map(|k| (strsim::damerau_levenshtein(&lower, &k.to_lowercase()), k))
-        .filter(|(distance, k)| *distance <= 1 + k.len().min(word.len()) / 3)
+        .filter(|(distance, k)| *distance <= 1 + k.len().min(word.len()) / 3 && *distance < k.len().max(word.len()))
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, k)| k)
 }

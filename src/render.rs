@@ -98,25 +98,29 @@ fn assign(frame: &mut Frame, look: &Look, plan: &mut Plan) -> Result<Vec<Group>,
     Ok(groups)
 }
 
-/// What the techniques that a scene names have to say of their settings and of the materials they are to render.
-pub fn check(scene: &Scene) -> Result<(), Problems> {
+/// What the techniques have to say of their settings and of the materials that they are to render. `technique` is that of
+/// every object that names none.
+pub fn check(scene: &Scene, technique: &TechniqueText) -> Result<(), Problems> {
     let mut problems = Vec::new();
     let mut known: Vec<(&str, Box<dyn Technique>)> = Vec::new();
     let named = scene.objects.iter().filter_map(|object| object.technique.as_ref());
-    for text in std::iter::once(&scene.view.technique).chain(named) {
+    for text in std::iter::once(technique).chain(named) {
         match techniques::read(text) {
-            Ok(technique) => known.push((&text.ron, technique)),
+            Ok(read) => known.push((&text.ron, read)),
             Err(problem) => problems.push(problem),
         }
     }
     for object in scene.objects.iter().filter(|object| object.material.medium.medium().is_some()) {
-        let text = object.technique.as_ref().unwrap_or(&scene.view.technique);
-        let technique = known.iter().find(|(ron, _)| *ron == text.ron);
-        if let Some(problem) = technique.and_then(|(_, technique)| technique.refuses(&object.material)) {
-            let what = format!("the material of `{}`: {}", object.name, problem.what);
-            problems.push(text.problem("", what).hint(problem.hint.unwrap_or_default()));
-        }
+        let text = object.technique.as_ref().unwrap_or(technique);
+        let read = known.iter().find(|(ron, _)| *ron == text.ron);
+        problems.extend(read.and_then(|(_, read)| read.refuses(&object.material)));
     }
-    problems.dedup();
-    if problems.is_empty() { Ok(()) } else { Err(Problems(problems)) }
+    // Objects that share a material share its problems.
+    let mut told: Vec<Problem> = Vec::new();
+    problems.into_iter().for_each(|problem| {
+        if !told.contains(&problem) {
+            told.push(problem)
+        }
+    });
+    if told.is_empty() { Ok(()) } else { Err(Problems(told)) }
 }

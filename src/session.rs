@@ -64,9 +64,7 @@ impl Session {
 
     /// A scene with all that it names, and what is to be said of it.
     pub fn scene(&self, path: &Path) -> Result<(Scene, Vec<Problem>), Problems> {
-        let (scene, warnings) = self.reader.scene(path, &self.options.sets)?;
-        render::check(&scene)?;
-        Ok((scene, warnings))
+        self.reader.scene(path, &self.options.sets)
     }
 
     /// The device, opened when it is first asked for.
@@ -82,6 +80,7 @@ impl Session {
     /// The plan for a picture, and the picture.
     pub fn render(&mut self, scene: &Scene, look: &Look, watch: &dyn Watch) -> Result<(Plan, Arc<Image>), Problem> {
         let (plan, picture) = render::plan(scene, look, &self.shaders)?;
+        self.fits(scene, look)?;
         let image = self.get(&plan, picture, watch)?;
         if let Some(bad) = image.non_finite() {
             let (x, y) = bad.first;
@@ -90,6 +89,23 @@ impl Session {
                 .hint("this is a mistake in the program or in a shader that was edited; nothing was written"));
         }
         Ok((plan, image))
+    }
+
+    /// That the device's textures hold the picture with all its samples.
+    fn fits(&mut self, scene: &Scene, look: &Look) -> Result<(), Problem> {
+        let largest = self.gpu()?.device.limits().max_texture_dimension_2d;
+        let ((width, height), samples) = (look.view.size, look.view.antialias);
+        if width.max(height) <= largest / samples {
+            return Ok(());
+        }
+        // Who is to blame: the file, unless a flag asked for another size.
+        let cause = if look.view.size == scene.view.size { Cause::Files } else { Cause::Words };
+        let what = format!(
+            "{width} x {height} pixels of {samples} x {samples} samples are too large for the adapter, whose textures end \
+             at {largest} a side"
+        );
+        let hint = format!("at most {} pixels a side, or fewer samples: --set view.antialias=1", largest / samples);
+        Err(Problem::new(cause, what).hint(hint))
     }
 
     /// One value of a plan that needs the device.

@@ -1,55 +1,73 @@
-use super::Answer;
+use super::{Answer, counted};
 use crate::problem::{Problem, Problems};
+use crate::render;
 use crate::scene::Kind;
 use crate::session::{Options, Session};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// Read files with all that they name, and report every problem; draws nothing
 #[derive(clap::Args)]
 pub struct Check {
-    #[arg(required = true)]
+    /// Scenes and materials
+    #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Print each file with every default written out
     #[arg(long)]
     defaults: bool,
 }
 
+/// One file without errors.
+struct Sound {
+    text: String,
+    facts: Value,
+    warnings: Vec<Problem>,
+}
+
 impl Check {
     pub fn run(self, options: Options) -> Result<Answer, Problems> {
         let session = Session::new(options);
-        let mut answer = Answer::new("", json!({ "files": [] }));
-        let (mut warnings, mut errors) = (Vec::new(), Vec::new());
+        let (mut text, mut facts, mut told) = (String::new(), Vec::new(), Vec::new());
         for file in &self.files {
             match self.one(&session, file) {
-                Ok((text, found)) => {
-                    answer.text += &text;
-                    warnings.extend(found);
+                Ok(sound) => {
+                    text += &sound.text;
+                    facts.push(sound.facts);
+                    told.extend(sound.warnings);
                 }
-                Err(Problems(found)) => errors.extend(found),
+                Err(Problems(found)) => told.extend(found),
             }
         }
-        if !errors.is_empty() {
-            warnings.extend(errors);
-            return Err(Problems(warnings));
+        match told.iter().any(Problem::is_error) {
+            true => Err(Problems(told)),
+            false => Ok(Answer::new(text, json!({ "files": facts })).warn(told)),
         }
-        let names: Vec<String> = self.files.iter().map(|file| file.display().to_string()).collect();
-        answer.json = json!({ "files": names });
-        Ok(answer.warn(&warnings))
     }
 
-    fn one(&self, session: &Session, file: &Path) -> Result<(String, Vec<Problem>), Problems> {
-        let (what, warnings) = match session.reader.kind_of(file)? {
+    fn one(&self, session: &Session, file: &Path) -> Result<Sound, Problems> {
+        let (kind, what, warnings) = match session.reader.kind_of(file)? {
             Kind::Scene => {
                 let (scene, warnings) = session.scene(file)?;
-                (format!("a scene of {} object(s) and {} light(s)", scene.objects.len(), scene.lights.len()), warnings)
+                if let Err(Problems(refused)) = render::check(&scene, &scene.view.technique) {
+                    return Err(Problems(warnings.into_iter().chain(refused).collect()));
+                }
+                let (objects, lights) = (counted(scene.objects.len(), "object"), counted(scene.lights.len(), "light"));
+                ("scene", format!("a scene of {objects} and {lights}"), warnings)
             }
-            Kind::Material => ("a material".to_string(), session.reader.material(file)?.1),
+            Kind::Material => ("material", "a material".to_string(), session.reader.material(file)?.1),
         };
+        let mut facts = json!({ "file": file.display().to_string(), "kind": kind });
         let text = match self.defaults {
-            true => session.reader.defaults(file)? + "\n",
-            false => format!("{}: {what}, no errors\n", file.display()),
+            true => {
+                let text = session.reader.defaults(file)?;
+                facts["defaults"] = json!(text);
+                format!("// {} with every default written out.\n{text}", file.display())
+            }
+            false => {
+                let judgement = if warnings.is_empty() { "sound".into() } else { counted(warnings.len(), "warning") };
+                format!("{}: {what}: {judgement}\n", file.display())
+            }
         };
-        Ok((text, warnings))
+        Ok(Sound { text, facts, warnings })
     }
 }

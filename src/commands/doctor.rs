@@ -4,7 +4,7 @@ use crate::problem::{Cause, Problem, Problems};
 use crate::session::Options;
 use serde_json::json;
 
-/// Say what this machine draws with, and what to install when there is nothing
+/// Say what this machine draws with, or what to install when there is nothing
 #[derive(clap::Args)]
 pub struct Doctor {}
 

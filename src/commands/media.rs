@@ -8,16 +8,17 @@ use glam::DVec3;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// The library of measured media
+/// Look into the library of measured media
 #[derive(clap::Subcommand)]
 pub enum Media {
-    /// All of them
+    /// List all of them with their coefficients
     List,
-    /// Every quantity that follows from a medium, in mm
+    /// Print every quantity that follows from a medium, in mm
     Show {
-        /// A preset, or a material's file
+        /// A medium of the library, or a material's file
+        #[arg(value_name = "NAME|FILE")]
         medium: String,
-        /// Also in units of this scene, as a share of its objects, and in pixels
+        /// Print it also in units of this scene, in pixels, and as a share of its objects
         #[arg(long, value_name = "SCENE")]
         scene: Option<PathBuf>,
     },
@@ -37,23 +38,34 @@ fn row(v: DVec3) -> String {
 }
 
 fn list() -> Answer {
+    let three = |v: DVec3| format!("{:>8} {:>8} {:>8}", short(v.x), short(v.y), short(v.z));
     let line = |preset: Preset| {
         let medium = preset.medium;
         format!(
-            "{:<16} sigma_s' {}   sigma_a {}   ior {}   {}\n",
+            "{:<12}  {}  {}  {:>4}  {}\n",
             preset.name,
-            row(medium.sigma_s_prime()),
-            row(medium.sigma_a),
+            three(medium.sigma_s_prime()),
+            three(medium.sigma_a),
             preset.ior,
-            preset.source,
+            preset.source
         )
     };
+    let head = format!(
+        "{:<12}  {:<26}  {:<26}   ior  measured by\n",
+        "", "sigma_s' [1/mm]  R  G  B", "sigma_a [1/mm]  R  G  B"
+    );
     let facts: Vec<Value> = presets()
         .map(|preset| {
             json!({ "name": preset.name, "ior": preset.ior, "source": preset.source, "medium": preset.medium })
         })
         .collect();
-    Answer::new(presets().map(line).collect::<String>(), json!({ "media": facts }))
+    Answer::new(head + &presets().map(line).collect::<String>(), json!({ "media": facts }))
+}
+
+/// To four digits, without the zeros that follow.
+fn short(value: f64) -> String {
+    let text = format!("{value:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').to_string()
 }
 
 fn show(name: &str, scene: Option<&Path>, options: Options) -> Result<Answer, Problems> {
@@ -94,7 +106,7 @@ fn show(name: &str, scene: Option<&Path>, options: Options) -> Result<Answer, Pr
         text += &more;
         facts["scene"] = in_scene;
     }
-    Ok(Answer::new(text, facts).warn(&warnings))
+    Ok(Answer::new(text, facts).warn(warnings))
 }
 
 /// JSON knows no infinity.

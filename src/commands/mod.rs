@@ -1,10 +1,12 @@
-//! The commands: what the words mean, one file each. A command returns what it has to say; `main` prints it.
+//! The commands: what the words mean, one file each. [`answer`] makes words into what is to be printed.
 
 mod bake;
 mod cache;
 mod check;
 mod doctor;
 mod explain;
+mod help;
+mod look;
 mod media;
 mod new;
 mod progress;
@@ -12,50 +14,39 @@ mod render;
 mod techniques;
 
 use crate::problem::{Cause, Problem, Problems};
-use crate::scene::Scene;
 use crate::session::{Options, Session};
 use clap::{Parser, Subcommand};
-use serde_json::Value;
+use serde_json::{Value, json};
+use std::ffi::OsString;
+use std::io::{self, ErrorKind, Write};
 use std::path::PathBuf;
 
-/// Renders translucent things from text files.
 #[derive(Parser)]
-#[command(name = "diaphane", version, about, long_about = None, disable_help_subcommand = true, max_term_width = 100)]
-#[command(before_help = FIRST_SESSION)]
-pub struct Words {
+#[command(name = "diaphane", bin_name = "diaphane", version, about = help::ABOUT, long_about = None)]
+#[command(help_template = help::TEMPLATE, before_help = help::FIRST_SESSION, after_help = help::EXIT, max_term_width = 100)]
+struct Words {
     #[command(subcommand)]
     command: Option<Command>,
     #[command(flatten)]
     global: Global,
 }
 
-/// What is said before the help, and when there are no words at all.
-pub const FIRST_SESSION: &str = "\
-Diaphane renders translucent things (skin, marble, jade, wax, milk, leaves) from text files,
-and says what each way of rendering them costs.
-
-A first session:
-  diaphane new pebble                            write pebble.ron and pebble.material.ron
-  diaphane render pebble.ron -o pebble.png       make a picture of it
-  diaphane check pebble.ron                      say what is wrong with it, after an edit
-  diaphane explain pebble.ron                    say what a picture takes, and what it does not
-  diaphane techniques                            list the ways of making light go through things";
-
 #[derive(clap::Args, Clone, Debug)]
+#[command(next_help_heading = "Options of every command")]
 struct Global {
-    /// The same facts for programs
+    /// Print the same facts as JSON, for programs
     #[arg(long, global = true)]
     json: bool,
-    /// Where bakes are kept
-    #[arg(long, global = true, value_name = "DIR", env = "DIAPHANE_CACHE")]
+    /// Keep bakes in this folder, else in the one that DIAPHANE_CACHE names, else where this system keeps caches
+    #[arg(long, global = true, value_name = "DIR")]
     cache_dir: Option<PathBuf>,
     /// Keep no bakes, and use none that were kept
     #[arg(long, global = true)]
     no_cache: bool,
-    /// The adapter to draw with, by a part of its name
+    /// Draw with the adapter whose name contains this; `diaphane doctor` lists them
     #[arg(long, global = true, value_name = "NAME")]
     adapter: Option<String>,
-    /// Put RON in place of what the scene says: `objects.bunny.transform.scale=2`
+    /// Put RON in place of what the scene says: objects.bunny.transform.scale=2
     #[arg(long, global = true, value_name = "PATH=RON")]
     set: Vec<String>,
 }
@@ -63,65 +54,146 @@ struct Global {
 #[derive(Subcommand)]
 enum Command {
     New(new::New),
+    Render(render::Render),
     Check(check::Check),
     Explain(explain::Explain),
-    Render(render::Render),
+    Techniques(techniques::Techniques),
     Bake(bake::Bake),
     #[command(subcommand)]
     Media(media::Media),
-    Techniques(techniques::Techniques),
     #[command(subcommand)]
     Cache(cache::Cache),
     Doctor(doctor::Doctor),
 }
 
+/// What the program says, and with which status it ends.
+pub struct Said {
+    /// For stdout: text or JSON.
+    pub facts: String,
+    /// For stderr: warnings and errors.
+    pub talk: String,
+    pub status: u8,
+}
+
+impl Said {
+    fn facts(facts: String) -> Said {
+        Said { facts, talk: String::new(), status: 0 }
+    }
+
+    /// Nothing, since what there is to say was said while it happened.
+    pub fn unfinished() -> Said {
+        Said { facts: String::new(), talk: String::new(), status: Cause::Unfinished.exit_status() }
+    }
+
+    fn wrong(problems: &Problems, json: bool) -> Said {
+        let all: Vec<_> = problems.0.iter().map(Problem::json).collect();
+        let facts = if json { pretty(&json!({ "problems": all })) } else { String::new() };
+        Said { facts, talk: problems.to_string(), status: problems.cause().exit_status() }
+    }
+}
+
+fn pretty(json: &Value) -> String {
+    format!("{json:#}\n")
+}
+
 /// What a command has to say: for people and for programs.
 #[derive(Debug, Default)]
-pub struct Answer {
-    /// The facts, for stdout.
-    pub text: String,
-    pub json: Value,
-    /// Talk, for stderr: warnings.
-    pub talk: Vec<String>,
+struct Answer {
+    text: String,
+    json: Value,
+    warnings: Vec<Problem>,
 }
 
 impl Answer {
     fn new(text: impl Into<String>, json: Value) -> Answer {
-        Answer { text: text.into(), json, talk: Vec::new() }
+        Answer { text: text.into(), json, warnings: Vec::new() }
     }
 
-    fn warn(mut self, warnings: &[Problem]) -> Answer {
-        self.talk.extend(warnings.iter().map(Problem::to_string));
+    fn warn(mut self, warnings: impl IntoIterator<Item = Problem>) -> Answer {
+        self.warnings.extend(warnings);
+        self
+    }
+
+    /// The warnings among the facts too, for programs that do not read stderr.
+    fn with_warnings(mut self) -> Answer {
         if let Value::Object(facts) = &mut self.json {
-            facts.insert("warnings".into(), warnings.iter().map(Problem::json).collect());
+            facts.insert("warnings".into(), self.warnings.iter().map(Problem::json).collect());
         }
         self
     }
 }
 
-impl Words {
-    pub fn wants_json(&self) -> bool {
-        self.global.json
-    }
-
-    /// Does what the words say.
-    pub fn run(self) -> Result<Answer, Problems> {
-        let options = self.global.options()?;
-        match self.command {
-            None => Ok(Answer::new(
-                format!("{FIRST_SESSION}\n\n`diaphane --help` lists the rest.\n"),
-                serde_json::json!({ "version": env!("CARGO_PKG_VERSION") }),
-            )),
-            Some(Command::New(command)) => command.run(),
-            Some(Command::Check(command)) => command.run(options),
-            Some(Command::Explain(command)) => command.run(options),
-            Some(Command::Render(command)) => command.run(options),
-            Some(Command::Bake(command)) => command.run(options),
-            Some(Command::Media(command)) => command.run(options),
-            Some(Command::Techniques(command)) => command.run(),
-            Some(Command::Cache(command)) => command.run(options),
-            Some(Command::Doctor(command)) => command.run(options),
+/// Does what the words say. The first is the program's own name.
+pub fn answer(words: impl IntoIterator<Item = OsString>) -> Said {
+    let words: Vec<OsString> = words.into_iter().collect();
+    let words = match Words::try_parse_from(&words) {
+        Ok(words) => words,
+        Err(error) => return help::complaint(&error, help::wants_json(&words)),
+    };
+    let json = words.global.json;
+    match words.run() {
+        Ok(answer) => {
+            let facts = if json { pretty(&answer.json) } else { answer.text };
+            Said { facts, talk: Problems(answer.warnings).to_string(), status: 0 }
         }
+        Err(problems) => Said::wrong(&blame(problems), json),
+    }
+}
+
+/// Words on stdout. Whoever stops reading has read enough; a full disk is a failure.
+pub fn print(text: &str) -> Result<(), Problem> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            let problem = Problem::new(Cause::Unfinished, format!("stdout cannot be written: {error}"))
+                .hint("free some space, or let the output go elsewhere");
+            writeln!(io::stderr(), "{problem}").ok(); // there is nowhere left to say that this failed too
+            Err(problem)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// What is said when the program itself is wrong.
+pub fn mistake(panic: &std::panic::PanicHookInfo) -> Problem {
+    let what = panic.payload_as_str().unwrap_or("something that must not happen did");
+    let place = panic.location().map(|at| format!(" ({}:{})", at.file(), at.line())).unwrap_or_default();
+    Problem::new(Cause::Unfinished, format!("a mistake in the program: {what}{place}"))
+        .hint("your files are as they were, and bakes that were finished are kept; please report this with the command")
+}
+
+/// What stands in a flag is wrong words, not a wrong file.
+fn blame(Problems(mut problems): Problems) -> Problems {
+    for problem in &mut problems {
+        if problem
+            .at
+            .as_ref()
+            .is_some_and(|at| ["--set", "--technique"].iter().any(|flag| at.file.as_os_str() == *flag))
+        {
+            problem.cause = Cause::Words;
+        }
+    }
+    Problems(problems)
+}
+
+impl Words {
+    fn run(self) -> Result<Answer, Problems> {
+        let options = self.global.options()?;
+        // What a command prints as it goes: with `--json`, nothing but the whole.
+        let line = |text: &str| if self.global.json { Ok(()) } else { print(text) };
+        let answer = match self.command {
+            None => help::all(),
+            Some(Command::New(command)) => command.run()?,
+            Some(Command::Check(command)) => command.run(options)?,
+            Some(Command::Explain(command)) => return command.run(options),
+            Some(Command::Render(command)) => command.run(options, &line)?,
+            Some(Command::Bake(command)) => command.run(options)?,
+            Some(Command::Media(command)) => command.run(options)?,
+            Some(Command::Techniques(command)) => command.run()?,
+            Some(Command::Cache(command)) => command.run(options)?,
+            Some(Command::Doctor(command)) => command.run(options)?,
+        };
+        Ok(answer.with_warnings())
     }
 }
 
@@ -135,7 +207,10 @@ impl Global {
             Ok((path.trim().to_string(), ron.trim().to_string()))
         });
         Ok(Options {
-            cache_dir: self.cache_dir.clone(),
+            cache_dir: self.cache_dir.clone().or_else(|| {
+                let named = std::env::var_os("DIAPHANE_CACHE").filter(|folder| !folder.is_empty());
+                named.map(PathBuf::from)
+            }),
             no_cache: self.no_cache,
             adapter: self.adapter.clone(),
             sets: sets.collect::<Result<_, Problem>>()?,
@@ -147,91 +222,19 @@ impl Global {
 fn session(options: Options) -> Session {
     let session = Session::new(options);
     let cancel = session.store.cancel.clone();
+    let interrupted = move || {
+        // Who asks twice does not want to wait for a step that looks up rarely.
+        if cancel.is_cancelled() {
+            std::process::exit(Cause::Unfinished.exit_status().into());
+        }
+        cancel.cancel();
+    };
     // A second handler cannot be set; the first serves.
-    ctrlc::set_handler(move || cancel.cancel()).ok();
+    ctrlc::set_handler(interrupted).ok();
     session
 }
 
-/// `--size 960x540`
-fn parse_size(text: &str) -> Result<(u32, u32), String> {
-    let parse = |side: &str| side.parse::<u32>().ok().filter(|side| (1..=16384).contains(side));
-    text.split_once('x')
-        .and_then(|(width, height)| Some((parse(width)?, parse(height)?)))
-        .ok_or_else(|| "a size is WIDTHxHEIGHT in pixels, 1x1 to 16384x16384, as in 960x540".into())
-}
-
-/// How to look at a scene, as flags say it.
-#[derive(clap::Args, Clone, Debug)]
-struct LookFlags {
-    /// Width and height in pixels
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
-    size: Option<(u32, u32)>,
-    /// The technique, with its settings: 'FilteredNormals()'
-    #[arg(long, value_name = "RON")]
-    technique: Option<String>,
-    /// One of the scene's bookmarks
-    #[arg(long, value_name = "BOOKMARK")]
-    camera: Option<String>,
-    /// Scene time, seconds
-    #[arg(long, value_name = "S")]
-    time: Option<f64>,
-    /// Which of its parts the picture shows
-    #[arg(long, value_enum, default_value = "full")]
-    part: PartFlag,
-    /// Leave nothing out, even what cannot change the picture
-    #[arg(long)]
-    no_skip: bool,
-}
-
-#[derive(Clone, Copy, Debug, clap::ValueEnum)]
-enum PartFlag {
-    Full,
-    /// Entered, scattered at least once, left
-    Scattered,
-    /// Reflected at the boundary
-    Glossy,
-    /// Passed through without scattering
-    Unscattered,
-}
-
-impl LookFlags {
-    fn look(&self, scene: &Scene) -> Result<crate::render::Look, Problem> {
-        use crate::frame::Part;
-        let mut look = crate::render::Look::of(scene);
-        if let Some(size) = self.size {
-            look.view.size = size;
-        }
-        if let Some(name) = &self.camera {
-            look.view.camera = *scene.bookmarks.get(name).ok_or_else(|| {
-                let names: Vec<&str> = scene.bookmarks.keys().map(String::as_str).collect();
-                let problem = Problem::new(Cause::Words, format!("--camera: there is no bookmark `{name}`"));
-                match (crate::problem::nearest(name, names.iter().copied()), names.is_empty()) {
-                    (Some(near), _) => problem.hint(format!("did you mean `{near}`?")),
-                    (None, true) => {
-                        problem.hint("the scene has none: add bookmarks: { \"name\": (eye: …, target: …) }")
-                    }
-                    (None, false) => problem.hint(format!("there is `{}`", names.join("`, `"))),
-                }
-            })?;
-        }
-        if let Some(time) = self.time {
-            if !time.is_finite() {
-                return Err(Problem::new(Cause::Words, "--time is not a finite number").hint("seconds, as in 1.5"));
-            }
-            look.view.time_s = time;
-        }
-        if let Some(ron) = &self.technique {
-            look.technique = crate::scene::TechniqueText::from_flag("--technique", ron)
-                .and_then(|text| crate::techniques::read(&text).map(|_| text))
-                .map_err(|problem| Problem { cause: Cause::Words, ..problem })?;
-        }
-        look.view.part = match self.part {
-            PartFlag::Full => Part::Full,
-            PartFlag::Scattered => Part::Scattered,
-            PartFlag::Glossy => Part::Glossy,
-            PartFlag::Unscattered => Part::Unscattered,
-        };
-        look.view.skip = !self.no_skip;
-        Ok(look)
-    }
+/// `1 bake`, `2 bakes`
+fn counted(count: usize, thing: &str) -> String {
+    format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }

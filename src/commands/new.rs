@@ -8,9 +8,9 @@ use std::path::PathBuf;
 /// Write a commented scene and a material that render as they are
 #[derive(clap::Args)]
 pub struct New {
-    /// Writes NAME.ron and NAME.material.ron
+    /// The scene's name: NAME.ron and NAME.material.ron are written
     name: PathBuf,
-    /// The substance to begin with: `diaphane media list`
+    /// The substance to begin with; `diaphane media list` lists them
     #[arg(long, value_name = "PRESET", default_value = "marble")]
     from: String,
 }
@@ -29,6 +29,11 @@ impl New {
         if name.is_empty() {
             return Err(Problem::new(Cause::Words, "a scene needs a name").hint("diaphane new pebble").into());
         }
+        // The name is a text in the scene, and words that are typed again and again.
+        if let Some(odd) = name.chars().find(|c| c.is_control() || "\"\\{}".contains(*c)) {
+            let what = format!("{odd:?} cannot stand in the name of a scene");
+            return Err(Problem::new(Cause::Words, what).hint("letters, digits, - and _ can").into());
+        }
         let scene = self.name.with_file_name(format!("{name}.ron"));
         let material = self.name.with_file_name(format!("{name}.material.ron"));
         for file in [&scene, &material] {
@@ -43,12 +48,19 @@ impl New {
         write_file(&material, fill(include_str!("new_material.ron")).as_bytes())?;
         write_file(&scene, fill(include_str!("new_scene.ron")).as_bytes())?;
         let text = format!(
-            "{}\n{}\n\nNow: diaphane render {} -o {name}.png\n",
+            "{}\n{}\n\nNow: diaphane render {} -o {}\n",
             scene.display(),
             material.display(),
-            scene.display(),
+            typed(&scene.display().to_string()),
+            typed(&format!("{name}.png")),
         );
         let files = [scene.display().to_string(), material.display().to_string()];
         Ok(Answer::new(text, json!({ "files": files })))
     }
+}
+
+/// A word as a shell wants it.
+fn typed(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_./,".contains(c);
+    if word.chars().all(plain) { word.to_string() } else { format!("'{}'", word.replace('\'', r"'\''")) }
 }

@@ -1,8 +1,10 @@
 //! What is seen of steps that run: a bar on a terminal, and a summary afterwards.
 
+use super::counted;
 use crate::problem::Problem;
-use crate::store::{Finished, Origin, PlannedStep, Watch};
+use crate::store::{Finished, Key, Origin, Plan, PlannedStep, Watch};
 use indicatif::{ProgressBar, ProgressStyle};
+use std::collections::BTreeSet;
 use std::io::IsTerminal;
 use std::sync::Mutex;
 use std::time::Duration;
@@ -32,11 +34,40 @@ impl Progress {
     }
 }
 
-/// `5 bakes ran, 2 came from disk, 31 passes drawn`
-pub fn summary(finished: &[Finished]) -> String {
-    let ran = finished.iter().filter(|step| step.origin == Origin::Ran).count();
-    let disk = finished.iter().filter(|step| step.origin == Origin::Disk).count();
-    format!("{ran} steps ran, {disk} came from disk")
+/// How many values were made, and how many were there.
+#[derive(Default)]
+pub struct Made {
+    pub bakes: usize,
+    pub from_disk: usize,
+    pub passes: usize,
+}
+
+impl Made {
+    pub fn of(plan: &Plan, finished: &[Finished]) -> Made {
+        let bakes: BTreeSet<Key> = plan.steps().iter().filter(|step| step.is_bake()).map(|step| step.key).collect();
+        let mut made = Made::default();
+        for step in finished {
+            match (step.origin, bakes.contains(&step.key)) {
+                (Origin::Ran, true) => made.bakes += 1,
+                (Origin::Ran, false) => made.passes += 1,
+                (Origin::Disk, _) => made.from_disk += 1,
+                (Origin::Memory, _) => {}
+            }
+        }
+        made
+    }
+}
+
+/// `2 bakes from disk, 1 made, 31 passes drawn`
+impl std::fmt::Display for Made {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let from_disk = counted(self.from_disk, "bake");
+        write!(f, "{from_disk} from disk, {} made, {} drawn", self.bakes, counted_passes(self.passes))
+    }
+}
+
+fn counted_passes(passes: usize) -> String {
+    if passes == 1 { "1 pass".into() } else { format!("{passes} passes") }
 }
 
 pub fn seconds(time: Duration) -> String {

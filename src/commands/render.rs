@@ -1,5 +1,6 @@
-use super::progress::{Progress, seconds, summary};
-use super::{Answer, LookFlags, session};
+use super::look::LookFlags;
+use super::progress::{Made, Progress, seconds};
+use super::{Answer, session};
 use crate::image::{Display, Format, write_file};
 use crate::problem::{Cause, Problem, Problems};
 use crate::render::Look;
@@ -14,50 +15,57 @@ use std::time::Instant;
 /// Make a picture, or a row of them
 #[derive(clap::Args)]
 pub struct Render {
+    /// The scene's file
     scene: PathBuf,
-    /// Where to: .png (as a display shows it) or .exr (linear light); with several frames %04d stands for the number
+    /// Where to: .png (as a display shows it) or .exr (linear light); of several pictures, %04d is the number
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     #[command(flatten)]
     look: LookFlags,
-    /// So many pictures, one after another in time
+    /// Make so many pictures, one after another in time
     #[arg(long, value_name = "N", conflicts_with = "turntable")]
     frames: Option<u32>,
-    /// Frames per second of scene time
+    /// Pictures per second of scene time, for --frames
     #[arg(long, value_name = "N", default_value_t = 24.0)]
     fps: f64,
-    /// So many pictures, once around what the camera looks at
+    /// Make so many pictures, once around what the camera looks at
     #[arg(long, value_name = "N")]
     turntable: Option<u32>,
-    /// The time of every step
+    /// Print the time of every step
     #[arg(long)]
     timings: bool,
 }
 
 impl Render {
-    pub fn run(self, options: Options) -> Result<Answer, Problems> {
+    /// `line` is told of each picture when it is there.
+    pub fn run(self, options: Options, line: &dyn Fn(&str) -> Result<(), Problem>) -> Result<Answer, Problems> {
         let format = Format::of(&self.output)?;
+        let words = |what: &str, hint: &str| Problems::from(Problem::new(Cause::Words, what).hint(hint));
         let count = self.frames.or(self.turntable);
         if count == Some(0) {
-            return Err(Problem::new(Cause::Words, "no frames is nothing to do").hint("ask for at least 1").into());
+            return Err(words("no pictures are nothing to do", "ask for at least 1"));
         }
         if count.is_some() && numbered(&self.output, 0).is_none() {
-            return Err(Problem::new(Cause::Words, "several frames cannot go to one file")
-                .hint("put the number's place into the name: -o out.%04d.png")
-                .into());
+            return Err(words(
+                "several pictures cannot go to one file",
+                "put the number's place into the name: -o out.%04d.png",
+            ));
+        }
+        if !(self.fps.is_finite() && self.fps > 0.0) {
+            return Err(words(&format!("--fps {}: time would stand still", self.fps), "a number above 0, as in 24"));
         }
         let mut session = session(options);
         session.timed = self.timings;
         let (scene, warnings) = session.scene(&self.scene)?;
         let look = self.look.look(&scene)?;
-        let mut answer = Answer::new("", json!({ "images": [] })).warn(&warnings);
+        let mut answer = Answer::new("", json!({ "images": [] })).warn(warnings);
         for frame in 0..count.unwrap_or(1) {
             let look = self.frame(&look, frame);
             let file = match count {
                 Some(_) => numbered(&self.output, frame).expect("the name was looked at above"),
                 None => self.output.clone(),
             };
-            self.picture(&mut session, &scene, &look, &file, format, &mut answer)?;
+            line(&self.picture(&mut session, &scene, &look, &file, format, &mut answer)?)?;
         }
         Ok(answer)
     }
@@ -76,6 +84,7 @@ impl Render {
         look
     }
 
+    /// One picture and what there is to say of it.
     fn picture(
         &self,
         session: &mut Session,
@@ -84,10 +93,10 @@ impl Render {
         file: &Path,
         format: Format,
         answer: &mut Answer,
-    ) -> Result<(), Problem> {
+    ) -> Result<String, Problem> {
         let started = Instant::now();
         let progress = Progress::new();
-        let (_, image) = session.render(scene, look, &progress)?;
+        let (plan, image) = session.render(scene, look, &progress)?;
         let display = Display { tone: scene.view.tone, exposure_ev: scene.view.exposure_ev as f32 };
         let text = [
             ("Software", concat!("diaphane ", env!("CARGO_PKG_VERSION"))),
@@ -96,13 +105,9 @@ impl Render {
         ];
         write_file(file, &image.encode(format, display, &text)?)?;
         let (finished, warnings) = progress.take();
-        answer.talk.extend(warnings.iter().map(Problem::to_string));
+        answer.warnings.extend(warnings);
         let time = started.elapsed();
         let (width, height) = look.view.size;
-        answer.text += &format!("{}  {width} x {height}  {}  {}\n", file.display(), seconds(time), summary(&finished));
-        if self.timings {
-            answer.text += &timings(&finished);
-        }
         if let Some(Value::Array(images)) = answer.json.get_mut("images") {
             images.push(json!({
                 "path": file.display().to_string(),
@@ -112,7 +117,9 @@ impl Render {
                 "steps": finished.iter().map(facts).collect::<Vec<_>>(),
             }));
         }
-        Ok(())
+        let made = Made::of(&plan, &finished);
+        let timings = if self.timings { timings(&finished) } else { String::new() };
+        Ok(format!("{}  {width} x {height}  {}  {made}\n{timings}", file.display(), seconds(time)))
     }
 }
 
@@ -134,16 +141,17 @@ fn timings(finished: &[Finished]) -> String {
     finished.iter().map(line).collect()
 }
 
-/// `out.%04d.png` for the n-th frame.
+/// `out.%04d.png` for the n-th frame. More than nine digits hold no number that is counted to.
 fn numbered(file: &Path, n: u32) -> Option<PathBuf> {
     let name = file.to_string_lossy();
-    let start = name.find('%')?;
-    let digits = name[start + 1..].find('d')?;
-    let width: usize = match &name[start + 1..start + 1 + digits] {
-        "" => 0,
-        width => width.parse().ok()?,
-    };
-    Some(format!("{}{n:0width$}{}", &name[..start], &name[start + digits + 2..]).into())
+    name.match_indices('%').find_map(|(start, _)| {
+        let (width, rest) = name[start + 1..].split_once('d')?;
+        let width: usize = match width {
+            "" => 0,
+            digits => digits.parse().ok().filter(|width| *width <= 9)?,
+        };
+        Some(format!("{}{n:0width$}{rest}", &name[..start]).into())
+    })
 }
 
 #[cfg(test)]
@@ -155,6 +163,8 @@ mod tests {
         let name = |pattern: &str| numbered(Path::new(pattern), 7).map(|p| p.display().to_string());
         assert_eq!(name("a/out.%04d.png").as_deref(), Some("a/out.0007.png"));
         assert_eq!(name("%d.exr").as_deref(), Some("7.exr"));
+        assert_eq!(name("50%/out.%2d.png").as_deref(), Some("50%/out.07.png"));
+        assert_eq!(name("out.%070000d.png"), None);
         assert_eq!(name("out.png"), None);
         assert_eq!(name("out.%xd.png"), None);
     }

@@ -80,7 +80,7 @@ impl Shaders {
     /// The shader folder that an artist would expect to be read: the one that the environment names, the one here, the
     /// one that the program was built from; else none.
     pub fn usual_folder() -> Option<PathBuf> {
-        if let Some(folder) = std::env::var_os("DIAPHANE_SHADERS") {
+        if let Some(folder) = std::env::var_os("DIAPHANE_SHADERS").filter(|folder| !folder.is_empty()) {
             return Some(folder.into());
         }
         let is_ours = |folder: &PathBuf| EMBEDDED.iter().all(|(name, _)| folder.join(name).is_file());
@@ -132,9 +132,15 @@ impl Shaders {
             return Ok(());
         }
         let (path, source) = self.source(name).map_err(|why| {
-            let known = crate::problem::nearest(name, Shaders::names());
-            let problem = Problem::files(format!("the shader {name} cannot be read: {why}"))
-                .hint(known.map_or("restore the file".into(), |near| format!("there is {near}")));
+            let hint = match (crate::problem::nearest(name, Shaders::names()), &self.folder) {
+                (Some(near), _) if near != name => format!("there is {near}"),
+                (_, Some(folder)) => format!(
+                    "put it into {}, or name no folder in DIAPHANE_SHADERS: the program carries its own shaders",
+                    folder.display()
+                ),
+                (_, None) => "restore the file".into(),
+            };
+            let problem = Problem::files(format!("the shader {name} cannot be read: {why}")).hint(hint);
             match included_at {
                 Some(at) => problem.at(at),
                 None => problem,

@@ -60,7 +60,7 @@ pub fn text(file: &File) -> Result<Arc<Source>, Problem> {
 
 /// A file that nothing names but the user.
 pub fn read(files: &Files, path: &Path) -> Result<File, Problem> {
-    files.read(path).map_err(|e| unreadable(path, &e))
+    files.read(path).map_err(|e| unreadable(path, &e, "is the name right?"))
 }
 
 pub fn open(files: &Files, path: &Path) -> Result<Node, Problem> {
@@ -136,7 +136,11 @@ pub fn resolve(node: &Node, path: &str) -> PathBuf {
 /// Reads the file that `node`, a text, names.
 pub fn named(files: &Files, node: &Node, path: &str) -> Result<File, Problem> {
     let full = resolve(node, path);
-    files.read(&full).map_err(|e| unreadable(&full, &e).at(node.at()))
+    let rule = match node.source.file.to_str() {
+        Some("--set") => "paths are relative to the scene's file",
+        _ => "paths are relative to the file that names them",
+    };
+    files.read(&full).map_err(|e| unreadable(&full, &e, rule).at(node.at()))
 }
 
 /// Whether a problem stands in a text, or is one of a file as a whole.
@@ -154,8 +158,8 @@ pub fn at_its_name(problem: Problem, node: &Node) -> Problem {
     Problem { what: format!("{place}{}", problem.what), ..problem }.at(node.at())
 }
 
-/// What to say of a file that cannot be read: why, where it was looked for, and what is there.
-fn unreadable(path: &Path, error: &std::io::Error) -> Problem {
+/// What to say of a file that cannot be read: why, where it was looked for, and what is there; else the `rule` for paths.
+fn unreadable(path: &Path, error: &std::io::Error, rule: &str) -> Problem {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     let why = match error.kind() {
@@ -173,16 +177,19 @@ fn unreadable(path: &Path, error: &std::io::Error) -> Problem {
     let stems: Vec<String> = there.iter().filter(|name| alike(name)).map(|name| stem(name)).collect();
     let near = nearest(&stem(&file), stems.iter().map(String::as_str));
     let near = there.iter().find(|name| alike(name) && Some(stem(name).as_str()) == near);
-    let looked = format!("looked in {}", shown(folder).display());
+    let looked = match shown(folder) {
+        here if here.as_os_str() == "." => "looked in the current folder".to_string(),
+        folder => format!("looked in {}", folder.display()),
+    };
     let hint = match near {
+        _ if path.is_dir() => "name a file in it".to_string(),
         Some(right) if *right != file => format!("{looked}; did you mean `{right}`?"),
         _ if path.components().any(|c| c.as_os_str() == "models") => {
             format!("{looked}; tools/fetch-models brings the models")
         }
-        _ if !folder.is_dir() => {
-            format!("{looked}, which is not there; paths are relative to the file that names them")
-        }
-        _ => format!("{looked}; paths are relative to the file that names them"),
+        _ if folder.is_file() => format!("{looked}, which is a file, not a folder"),
+        _ if !folder.is_dir() => format!("{looked}, which is not there; {rule}"),
+        _ => format!("{looked}; {rule}"),
     };
     Problem::files(format!("cannot read `{}`: {why}", shown(path).display())).at(At::file(&shown(path))).hint(hint)
 }

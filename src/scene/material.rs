@@ -11,6 +11,7 @@ use crate::scene::medium::{MediumSpec, Substance};
 use crate::scene::outside::{Channel, Encoding, Texture};
 use crate::scene::path::join;
 use crate::scene::reader::Reader;
+use crate::scene::tree::Node;
 use crate::store::Key;
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -32,6 +33,31 @@ pub struct Material {
     pub filter: Filter,
     /// From the outside inwards; below the last lies `medium`.
     pub layers: Vec<Layer>,
+    #[serde(skip)]
+    pub(super) written: Written,
+}
+
+/// Where each field of a material was written. It changes nothing that is rendered, so any two are equal.
+#[derive(Clone)]
+pub(super) struct Written(Arc<Node>);
+
+impl PartialEq for Written {
+    fn eq(&self, _: &Written) -> bool {
+        true
+    }
+}
+
+impl std::fmt::Debug for Written {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", self.0.source.file.display())
+    }
+}
+
+impl Material {
+    /// A problem with the field at `path`, `filter` or `surface.roughness`, told where it was written.
+    pub fn problem(&self, path: &str, what: impl Into<String>) -> Problem {
+        Problem::files(what).at(self.written.0.nearest(path).at()).path(path)
+    }
 }
 
 /// A dielectric boundary.
@@ -131,6 +157,7 @@ pub fn build(file: &MaterialFile, reader: &Reader, judge: &mut Judge<'_>) -> Opt
     });
     Some(Material {
         layers: layers.collect::<Option<_>>()?,
+        written: Written(Arc::new(judge.root.clone())),
         surface: Surface { ior, roughness: roughness?, color: color? },
         albedo: match &substance {
             Substance::Translucent(medium) => medium.multiple_scattering_albedo(ior),

@@ -54,7 +54,7 @@ pub fn shown(path: &Path) -> PathBuf {
             _ => out.push(part),
         }
     }
-    out
+    if out.as_os_str().is_empty() { PathBuf::from(".") } else { out }
 }
 
 /// One value and its place.

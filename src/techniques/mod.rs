@@ -28,8 +28,8 @@ pub trait Technique: Send + Sync {
         0.0
     }
 
-    /// What a material asks for that this technique cannot do, before anything is planned. `path` leads to the field in
-    /// the material's file.
+    /// What a material asks for that this technique cannot do, told at the field in the material's file, before anything
+    /// is planned.
     fn refuses(&self, _material: &Material) -> Option<Problem> {
         None
     }
@@ -56,12 +56,39 @@ macro_rules! entry {
 /// Every technique there is.
 pub const REGISTRY: &[Entry] = &[entry!(opaque, Opaque), entry!(filtered_normals, FilteredNormals)];
 
+/// Techniques that a scene may name one day.
+const LATER: [&str; 12] = [
+    "SphericalThickness",
+    "DepthMapThickness",
+    "PrecomputedTransfer",
+    "LongRange",
+    "ScreenSpace",
+    "DeepScreenSpace",
+    "MultiresolutionSplatting",
+    "SeparableScreenSpace",
+    "AdjacencyMaps",
+    "Layered",
+    "Reference",
+    "Auto",
+];
+
 /// The technique that a scene or a flag names, with its settings read.
 pub fn read(text: &TechniqueText) -> Result<Box<dyn Technique>, Problem> {
     match REGISTRY.iter().find(|entry| entry.name == text.name) {
         Some(entry) => (entry.read)(text),
-        None => Err(text.unknown(&REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>())),
+        None => Err(match not_in_this_version(&text.name) {
+            Some((what, hint)) => text.problem("", what).hint(hint),
+            None => text.unknown(&REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>()),
+        }),
     }
+}
+
+/// What to say of a technique that is known and not there yet, and which ones there are.
+pub fn not_in_this_version(name: &str) -> Option<(String, String)> {
+    let name = LATER.iter().find(|later| later.eq_ignore_ascii_case(name))?;
+    let names: Vec<&str> = REGISTRY.iter().map(|entry| entry.name).collect();
+    let version = env!("CARGO_PKG_VERSION");
+    Some((format!("the technique {name} is not in this version ({version})"), format!("there is {}", names.join(", "))))
 }
 
 impl Entry {

@@ -104,9 +104,9 @@ impl Technique for FilteredNormals {
             Filter::Curve(_) => "Curve",
         };
         Some(
-            Problem::files(format!("the kernel {name} is not there yet: it needs the spectrum of the mesh"))
-                .path("filter")
-                .hint("use Neighbours(…) or FromMedium(), or render with --technique 'Opaque()'"),
+            material
+                .problem("filter", format!("FilteredNormals has no kernel {name} in this version"))
+                .hint("write Neighbours(…) or FromMedium(), or render with --technique 'Opaque()'"),
         )
     }
 }
