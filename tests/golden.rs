@@ -84,15 +84,15 @@ fn first_light_is_the_golden_picture() {
     swapped.pixels_mut().for_each(|pixel| pixel.0.swap(0, 2));
     assert!(same(&swapped, &expected, software).is_err(), "swapped channels are not noticed");
     if software {
-        // The wax's mean free path, a tenth longer.
-        let wax = std::fs::read_to_string(root.join("materials/wax.ron")).unwrap();
-        let longer = wax.replace("mfp: (0.9, 0.7, 0.45)", "mfp: (0.99, 0.77, 0.495)");
-        assert_ne!(wax, longer);
+        // The jade's mean free path, a tenth longer.
+        let jade = std::fs::read_to_string(root.join("materials/jade.ron")).unwrap();
+        let longer = jade.replace("radius: 1.0,", "radius: 1.1,");
+        assert_ne!(jade, longer);
         let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("wax.ron");
+        let file = folder.path().join("jade.ron");
         std::fs::write(&file, longer).unwrap();
         let mut session =
-            Session::new(options(&[("objects.bowl.material", &format!("{:?}", file.display().to_string()))]));
+            Session::new(options(&[("objects.hare.material", &format!("{:?}", file.display().to_string()))]));
         let other = decoded(&render(&mut session, &root.join("scenes/first-light.ron")));
         assert!(same(&other, &expected, software).is_err(), "a longer mean free path is not noticed");
     }
