@@ -247,6 +247,7 @@ pub(super) fn quad(plan: &mut Plan, name: &str, u: DVec3, v: DVec3) -> Slot<Mesh
 
 #[derive(Serialize)]
 struct Quad {
+    #[serde(skip)] // only told
     name: String,
     u: DVec3,
     v: DVec3,

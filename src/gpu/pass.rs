@@ -50,6 +50,7 @@ pub struct Layer {
 #[derive(Serialize)]
 pub struct Raster {
     pub name: &'static str,
+    #[serde(skip)] // what is told of a pass changes nothing of it
     pub about: String,
     pub shader: Shader,
     pub size: (u32, u32),
@@ -65,6 +66,7 @@ pub struct Raster {
 #[derive(Serialize)]
 pub struct Fullscreen {
     pub name: &'static str,
+    #[serde(skip)] // what is told of a pass changes nothing of it
     pub about: String,
     pub shader: Shader,
     pub size: (u32, u32),
@@ -77,6 +79,7 @@ pub struct Fullscreen {
 #[derive(Serialize)]
 pub struct Compute {
     pub name: &'static str,
+    #[serde(skip)] // what is told of a pass changes nothing of it
     pub about: String,
     pub shader: Shader,
     /// The name of the shader's output, and the bytes of one of its elements.
