@@ -69,10 +69,6 @@ struct Group {
 /// Which technique renders which of the frame's items. Opaque things are rendered as such whatever the view names.
 fn assign(frame: &mut Frame, look: &Look, plan: &mut Plan) -> Result<Vec<Group>, Problem> {
     let mut groups: Vec<Group> = Vec::new();
-    if !look.view.part.has(Part::Scattered) {
-        plan.skip("scattered light", "the picture shows another part");
-        return Ok(groups);
-    }
     for place in 0..frame.items.len() {
         let Thing::Object(i) = frame.items[place].thing else { continue };
         let object = &frame.scene.objects[i];
@@ -95,6 +91,11 @@ fn assign(frame: &mut Frame, look: &Look, plan: &mut Plan) -> Result<Vec<Group>,
         }
     }
     groups.retain(|group| !group.items.is_empty());
+    // Only now: gloss sees the same shadows whichever part is shown, and where they are looked up is a technique's word.
+    if !look.view.part.has(Part::Scattered) {
+        plan.skip("scattered light", "the picture shows another part");
+        groups.clear();
+    }
     Ok(groups)
 }
 

@@ -94,7 +94,8 @@ fn fragment(in: Vertex) -> @location(0) vec4f {
     let mirrored = reflect(-to_eye, normal);
     var open = 1.0;
 #if OCCLUDED
-    open = saturate(in.openness.x + dot(in.openness.yzw, mirrored));
+    // What lies below the surface never counts as hidden: the same two bands of the whole upper half are 1/2 and 3/4 cos.
+    open = saturate((in.openness.x + dot(in.openness.yzw, mirrored)) / (0.5 + 0.75 * cos_out));
 #endif
     // The table's first and last texel stand for 0 and 1.
     let size = vec2f(textureDimensions(albedo_table));

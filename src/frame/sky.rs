@@ -67,6 +67,9 @@ impl Bake for SkyVisibility {
     const CODE: &'static [&'static str] = &["src/geometry/", "src/frame/sky.rs"];
 }
 
+/// Texels around the horizon at which each of the directions has hundreds.
+const FINE: u32 = 512;
+
 /// The mean radiance of an image around each of the directions.
 #[derive(Serialize)]
 struct SkyCells {
@@ -85,17 +88,21 @@ impl Step for SkyCells {
     fn run(&self, run: &Run) -> Result<Vec<Vec3>, Problem> {
         let image = run.get(self.image);
         let centres: Vec<Vec3> = directions(DIRECTIONS).iter().map(|d| d.as_vec3()).collect();
-        let rows: Vec<Vec<(DVec3, f64)>> = (0..image.height)
+        // A coarse image has few texels around each direction: they are cut up, or a small sun in one of them would shine
+        // too much or too little by the number of its neighbours.
+        let parts = FINE.div_ceil(image.width);
+        let (width, height) = (image.width * parts, image.height * parts);
+        let rows: Vec<Vec<(DVec3, f64)>> = (0..height)
             .into_par_iter()
             .map(|y| {
                 let mut sums = vec![(DVec3::ZERO, 0.0); DIRECTIONS];
-                let theta = PI * (y as f64 + 0.5) / image.height as f64;
-                for x in 0..image.width {
-                    let direction = sky_direction(x, theta, image.width, self.rotation).as_vec3();
+                let theta = PI * (y as f64 + 0.5) / height as f64;
+                for x in 0..width {
+                    let direction = sky_direction(x, theta, width, self.rotation).as_vec3();
                     let nearest = (0..DIRECTIONS)
                         .max_by(|a, b| centres[*a].dot(direction).total_cmp(&centres[*b].dot(direction)))
                         .expect("there are directions");
-                    let [r, g, b, _] = image.texels[(y * image.width + x) as usize];
+                    let [r, g, b, _] = image.texels[(y / parts * image.width + x / parts) as usize];
                     sums[nearest].0 += theta.sin() * Vec3::new(r, g, b).as_dvec3();
                     sums[nearest].1 += theta.sin();
                 }
@@ -109,7 +116,7 @@ impl Step for SkyCells {
                 let weight: f64 = rows.iter().map(|row| row[k].1).sum();
                 match weight > 0.0 {
                     true => (sum / weight).as_vec3(),
-                    // The image has fewer texels than there are directions: the nearest one serves.
+                    // The image is so low that its rows miss the direction: the nearest texel serves.
                     false => sample(&image, centres[k].as_dvec3(), self.rotation).as_vec3(),
                 }
             })

@@ -47,6 +47,11 @@ impl<'a> Surface<'a> {
         })
     }
 
+    /// The longest side of a member's box, as its object wears it: scene units.
+    pub fn extent(&self, member: &Member) -> f64 {
+        self.frame.object(self.item(member)).map_or(0.0, super::extent)
+    }
+
     pub fn shader(&self, name: &str, flags: &[&str]) -> Result<Shader, Problem> {
         self.frame.shaders.load(name, flags)
     }

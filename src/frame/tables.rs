@@ -93,3 +93,53 @@ uniform! {
         pub samples: u32,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::{Shaders, Uniform};
+    use std::collections::BTreeSet;
+    use std::sync::Arc;
+
+    /// What the shaders say of a struct, wherever one of them has it: name, size, and every field's name and offset.
+    type Layout = (String, u32, Vec<(String, u32)>);
+
+    fn of<T: Uniform + encase::ShaderSize>(name: &str) -> Layout {
+        let fields = T::fields().into_iter().map(|(field, offset)| (field.to_string(), offset)).collect();
+        (name.to_string(), T::SHADER_SIZE.get() as u32, fields)
+    }
+
+    fn in_shaders() -> BTreeSet<Layout> {
+        let shaders = Shaders::new(None, Arc::default());
+        let mut found = BTreeSet::new();
+        for name in Shaders::names() {
+            let shader = shaders.load(name, &[]).unwrap_or_else(|problem| panic!("{problem}"));
+            for (_, kind) in shader.module.types.iter() {
+                if let (Some(name), naga::TypeInner::Struct { members, span }) = (&kind.name, &kind.inner) {
+                    let fields = members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset)).collect();
+                    found.insert((name.clone(), *span, fields));
+                }
+            }
+        }
+        found
+    }
+
+    #[test]
+    fn structs_lie_where_the_shaders_look_for_their_fields() {
+        macro_rules! layouts {
+            ($($name:ident),*) => { vec![$(of::<$name>(stringify!($name))),*] };
+        }
+        let ours = layouts![Camera, Object, Light, Caster, ShadowView, Views, Vertices, Direction, Sky, Resolve];
+        let declared = include_str!("tables.rs").matches("uniform! {").count() - 1; // this line is one more
+        assert_eq!(ours.len(), declared, "a struct is missing in the list above");
+        let theirs = in_shaders();
+        for layout in &ours {
+            let same_name: Vec<_> = theirs.iter().filter(|other| other.0 == layout.0).collect();
+            assert_eq!(same_name, [layout], "program (right) and shaders (left)");
+        }
+        // A field that moves is noticed.
+        let mut moved = of::<Light>("Light");
+        moved.2.swap(4, 5);
+        assert!(!theirs.contains(&moved));
+    }
+}

@@ -139,7 +139,7 @@ impl Reader {
                 return None;
             }
         };
-        if let Some(material) = self.materials.lock().unwrap().get(&file.path) {
+        if let Some(material) = self.materials.lock().expect("nobody panics while reading").get(&file.path) {
             return material.clone();
         }
         let material = match self.material_of(&file) {
@@ -155,7 +155,7 @@ impl Reader {
                 None
             }
         };
-        self.materials.lock().unwrap().insert(file.path, material.clone());
+        self.materials.lock().expect("nobody panics while reading").insert(file.path, material.clone());
         material
     }
 
@@ -216,7 +216,7 @@ impl Reader {
     fn forget(&self) {
         self.meshes.forget();
         self.textures.forget();
-        self.materials.lock().unwrap().clear();
+        self.materials.lock().expect("nobody panics while reading").clear();
     }
 }
 
@@ -254,17 +254,17 @@ impl<K: Ord + Clone, T: Clone> Memory<K, T> {
         Memory { made: Mutex::new(Made { now: 0, values: BTreeMap::new() }) }
     }
     fn get(&self, key: &K, make: impl FnOnce() -> Result<T, Problem>) -> Result<T, Problem> {
-        let mut made = self.made.lock().unwrap();
+        let mut made = self.made.lock().expect("nobody panics while reading");
         let now = made.now;
         let entry = made.values.entry(key.clone()).or_insert_with(|| (now, make()));
         entry.0 = now;
         entry.1.clone()
     }
     fn peek(&self, key: &K) -> Option<T> {
-        self.made.lock().unwrap().values.get(key)?.1.clone().ok()
+        self.made.lock().expect("nobody panics while reading").values.get(key)?.1.clone().ok()
     }
     fn forget(&self) {
-        let mut made = self.made.lock().unwrap();
+        let mut made = self.made.lock().expect("nobody panics while reading");
         made.now += 1;
         let now = made.now;
         made.values.retain(|_, (used, _)| now - *used <= KEPT_READS);

@@ -221,7 +221,10 @@ impl Plan {
         spelling.write(name);
         spelling.write(&code);
         spelling.write(&step);
-        let (key, inputs) = spelling.finish();
+        let (key, mut inputs) = spelling.finish();
+        // A step may hold a slot many times over: one mesh in each face of a shadow map.
+        inputs.sort_unstable();
+        inputs.dedup();
         debug_assert!(inputs.iter().all(|&i| (i as usize) < self.steps.len()), "{name} reads another plan's slot");
         let index = self.insert(key, || PlannedStep {
             name,

@@ -8,7 +8,7 @@
 //!   `Uniform` is the literal equation, which does not.
 //! - `length: Keep` leaves the result shorter where normals disagree, and so dims, as diffusion does; `Unit` does not.
 //! - `filter: FromMedium()`, the default, is this kernel with the mean of the medium's sigma_tr over the channels, alpha 0
-//!   and a radius of 5/sigma_tr, beyond which less than a hundredth of the weight lies. A medium without absorption has no
+//!   and a radius of 7/sigma_tr, beyond which less than a hundredth of the weight lies. A medium without absorption has no
 //!   such length: half of the object's size serves.
 //!
 //! Costs: a bake per shape and kernel, which looks at every pair of neighbours; after it a frame costs exactly what
@@ -48,8 +48,8 @@ pub struct FilteredNormals {}
 /// lies beyond.
 const REACH: f64 = 7.0;
 
-/// The kernel that a material asks for, lengths in mm.
-fn kernel(material: &Material) -> Option<(Kernel, neighbours::Length)> {
+/// The kernel that a material asks for on an object half of whose size is `half`; lengths in mm.
+fn kernel(material: &Material, half: f64) -> Option<(Kernel, neighbours::Length)> {
     let weights = |w: Weights| match w {
         Weights::Area => neighbours::Weights::Area,
         Weights::Uniform => neighbours::Weights::Uniform,
@@ -68,8 +68,8 @@ fn kernel(material: &Material) -> Option<(Kernel, neighbours::Length)> {
         Filter::FromMedium(kernel) => {
             let Substance::Translucent(medium) = &material.medium else { return None };
             let sigma_tr = medium.sigma_tr().element_sum() / 3.0;
-            // Without absorption there is no such length: everything counts alike, as far as the object goes.
-            let radius = if sigma_tr > 0.0 { REACH / sigma_tr } else { f64::MAX };
+            // Without absorption there is no such length. Over the whole of a closed object normals would cancel.
+            let radius = if sigma_tr > 0.0 { REACH / sigma_tr } else { half };
             Some((Kernel { sigma_tr, radius, alpha: 0.0, weights: neighbours::Weights::Area }, length(kernel.length)))
         }
         _ => None,
@@ -82,15 +82,18 @@ impl Technique for FilteredNormals {
             if let Some(problem) = self.refuses(member.material) {
                 return Err(problem);
             }
-            let Some((kernel, length)) = kernel(member.material) else { return Ok(surface.normals(plan, member)) };
             let mm_per_unit = surface.mm_per_unit();
+            let half = 0.5 * surface.extent(member) * mm_per_unit;
+            let Some((kernel, length)) = kernel(member.material, half) else {
+                return Ok(surface.normals(plan, member));
+            };
             let normals = plan.bake(NeighbourNormals { mesh: member.mesh, mm_per_unit, kernel, length });
             Ok(surface.upload(plan, normals))
         })
     }
 
     fn entry_mm(&self, material: &Material) -> f64 {
-        kernel(material).map_or(0.0, |(kernel, _)| (1.0 / kernel.sigma_tr).min(kernel.radius))
+        kernel(material, f64::MAX).map_or(0.0, |(kernel, _)| (1.0 / kernel.sigma_tr).min(kernel.radius))
     }
 
     fn refuses(&self, material: &Material) -> Option<Problem> {

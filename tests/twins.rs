@@ -1,0 +1,244 @@
+//! What is spelled twice, in Rust and in WGSL, is the same function: each twin is evaluated on a grid on the device and
+//! compared with f64.
+
+mod studio;
+
+use diaphane::gpu::{Bind, Buffer, Compute, Gpu, Shaders};
+use diaphane::optics::{fresnel, microfacet, sh};
+use diaphane::store::{Key, Plan, Store};
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::Arc;
+use studio::{Nobody, studio};
+
+type Function = Box<dyn Fn(&[f64]) -> Vec<f64>>;
+
+struct Twin {
+    /// `src/optics/STEM.rs` and `shaders/optics/STEM.wgsl`.
+    stem: &'static str,
+    name: &'static str,
+    /// Every argument's values; the grid is all combinations.
+    axes: Vec<Vec<f64>>,
+    rust: Function,
+    /// How many numbers come out.
+    results: usize,
+    /// Relative to the value, or to `floor` where the value is smaller. f32 has 6e-8.
+    tolerance: f64,
+    floor: f64,
+    /// An edit of the shader that a person could make by mistake, and the test must see.
+    mistake: (&'static str, &'static str),
+}
+
+fn cosines() -> Vec<f64> {
+    [0.0, 1e-4, 1e-3, 0.01].into_iter().chain((1..=32).map(|i| i as f64 / 32.0)).collect()
+}
+
+fn roughnesses() -> Vec<f64> {
+    vec![0.03, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 1.0]
+}
+
+fn directions() -> Vec<f64> {
+    (-8..=8).map(|i| i as f64 / 8.0).collect()
+}
+
+fn twins() -> Vec<Twin> {
+    vec![
+        Twin {
+            stem: "fresnel",
+            name: "fresnel_dielectric",
+            axes: vec![cosines(), vec![0.25, 0.5, 0.75, 0.9999, 1.0, 1.0001, 1.1, 1.3, 1.33, 1.5, 2.4, 4.0]],
+            rust: Box::new(|a| vec![fresnel::fresnel_dielectric(a[0], a[1])]),
+            results: 1,
+            // Where the two sides are nearly alike r_s is a small difference of large numbers.
+            tolerance: 1e-5,
+            floor: 0.01,
+            mistake: ("eta * cos - cos_t", "cos - eta * cos_t"),
+        },
+        Twin {
+            stem: "microfacet",
+            name: "ggx_d",
+            axes: vec![cosines(), roughnesses()],
+            rust: Box::new(|a| vec![microfacet::ggx_d(a[0], a[1])]),
+            results: 1,
+            tolerance: 1e-5,
+            floor: 1e-6,
+            mistake: ("let alpha = roughness * roughness;", "let alpha = roughness;"),
+        },
+        Twin {
+            stem: "microfacet",
+            name: "smith_g2",
+            axes: vec![cosines(), cosines(), roughnesses()],
+            rust: Box::new(|a| vec![microfacet::smith_g2(a[0], a[1], a[2])]),
+            results: 1,
+            tolerance: 1e-5,
+            floor: 1e-3,
+            mistake: ("2.0 * cos_i * cos_o", "1.99 * cos_i * cos_o"),
+        },
+        Twin {
+            stem: "microfacet",
+            name: "ggx_lobe",
+            axes: vec![cosines(), cosines(), cosines(), roughnesses()],
+            rust: Box::new(|a| vec![microfacet::ggx_lobe(a[0], a[1], a[2], a[3])]),
+            results: 1,
+            tolerance: 2e-5,
+            floor: 1e-6,
+            mistake: ("* 0.5 * cos_i / both", "* 0.5 * cos_o / both"),
+        },
+        Twin {
+            stem: "sh",
+            name: "sh_basis_3",
+            axes: vec![directions(), directions(), directions()],
+            rust: Box::new(|a| sh::sh_basis_3(a[0], a[1], a[2]).to_vec()),
+            results: 9,
+            tolerance: 1e-6,
+            floor: 1.0,
+            mistake: ("0.4886025119029199 * x", "-0.4886025119029199 * x"),
+        },
+    ]
+}
+
+/// Every point of the grid, as f32 sees it.
+fn grid(axes: &[Vec<f64>]) -> Vec<Vec<f32>> {
+    axes.iter().fold(vec![Vec::new()], |points, axis| {
+        let longer = |point: &Vec<f32>, v: f64| point.iter().copied().chain([v as f32]).collect();
+        points.iter().flat_map(|point| axis.iter().map(|v| longer(point, *v)).collect::<Vec<_>>()).collect()
+    })
+}
+
+/// A compute shader that calls the twin once per invocation.
+fn harness(twin: &Twin) -> String {
+    let n = twin.axes.len();
+    let arguments: Vec<String> = (0..n).map(|i| format!("arguments[{n}u * i + {i}u]")).collect();
+    let call = format!("{}({})", twin.name, arguments.join(", "));
+    let store = match twin.results {
+        1 => format!("results[i] = {call};"),
+        r => format!("let all = {call};\n{}", store_all(r)),
+    };
+    format!(
+        "#include \"lib/element.wgsl\"\n#include \"optics/{}.wgsl\"\n\
+         @group(0) @binding(0) var<storage, read> arguments: array<f32>;\n\
+         @group(0) @binding(1) var<storage, read_write> results: array<f32>;\n\
+         @compute @workgroup_size(64)\n\
+         fn compute(@builtin(global_invocation_id) id: vec3u) {{\n\
+         let i = element(id);\n\
+         if i >= arrayLength(&results) / {}u {{ return; }}\n{store}\n}}\n",
+        twin.stem, twin.results,
+    )
+}
+
+fn store_all(results: usize) -> String {
+    (0..results).map(|k| format!("results[{results}u * i + {k}u] = all[{k}];\n")).collect()
+}
+
+/// The twin's values on the device, its shader edited.
+fn on_device(gpu: &Gpu, twin: &Twin, edit: (&str, &str)) -> Vec<f32> {
+    let folder = tempfile::tempdir().expect("a folder can be made");
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::create_dir_all(path.parent().expect("it is in the folder")).expect("a folder can be made");
+        std::fs::write(path, text).expect("a file can be written");
+    };
+    let read = |name: &str| std::fs::read_to_string(Path::new("shaders").join(name)).expect("the shader is there");
+    let optics = format!("optics/{}.wgsl", twin.stem);
+    let original = read(&optics);
+    let edited = original.replace(edit.0, edit.1);
+    assert!(edit.0 == edit.1 || edited != original, "{}: nothing reads `{}`", twin.name, edit.0);
+    write(&optics, &edited);
+    write("lib/element.wgsl", &read("lib/element.wgsl"));
+    write("twin.wgsl", &harness(twin));
+
+    let arguments: Vec<f32> = grid(&twin.axes).concat();
+    let shaders = Shaders::new(Some(folder.path().into()), Arc::default());
+    let mut plan = Plan::default();
+    let given = Arc::new(Buffer::new(gpu, bytemuck::cast_slice(&arguments)));
+    let arguments = plan.given("twin.arguments", twin.name, Key::of(twin.name), given);
+    let results = plan.add(Compute {
+        name: "twin",
+        about: twin.name.into(),
+        shader: shaders.load("twin.wgsl", &[]).unwrap_or_else(|problem| panic!("{problem}")),
+        output: ("results", 4 * twin.results as u32),
+        over: arguments,
+        over_stride: 4 * twin.axes.len() as u32,
+        binds: vec![("arguments", Bind::Buffer(arguments))],
+    });
+    let mut store = Store::in_memory();
+    let buffer = store.get_with(&plan, results, Some(gpu), &Nobody).unwrap_or_else(|problem| panic!("{problem}"));
+    let bytes = gpu.read_buffer(&buffer.buffer, buffer.bytes).unwrap_or_else(|problem| panic!("{problem}"));
+    bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().expect("4 bytes"))).collect()
+}
+
+/// The largest error in units of the tolerance, and where it is.
+fn worst(twin: &Twin, values: &[f32]) -> (f64, String) {
+    let points = grid(&twin.axes);
+    assert_eq!(values.len(), points.len() * twin.results);
+    let mut worst = (0.0, String::new());
+    for (point, found) in points.iter().zip(values.chunks_exact(twin.results)) {
+        let exact = (twin.rust)(&point.iter().map(|v| *v as f64).collect::<Vec<_>>());
+        for (exact, found) in exact.iter().zip(found) {
+            let error = (*found as f64 - exact).abs() / (twin.tolerance * exact.abs().max(twin.floor));
+            // A NaN on either side is as wrong as can be.
+            if error.is_nan() || error > worst.0 {
+                let error = if error.is_nan() { f64::INFINITY } else { error };
+                worst = (error, format!("{}{point:?} is {found} on the device and {exact} in Rust", twin.name));
+            }
+        }
+    }
+    worst
+}
+
+#[test]
+fn twins_agree_and_a_wrong_one_is_noticed() {
+    let mut studio = studio();
+    let gpu = studio.session.gpu().unwrap_or_else(|problem| panic!("{problem}"));
+    for twin in twins() {
+        let (error, place) = worst(&twin, &on_device(gpu, &twin, ("", "")));
+        println!("{}: {error:.3} of its tolerance", twin.name);
+        assert!(error <= 1.0, "{place}: {error:.1} times the tolerance");
+        let (error, _) = worst(&twin, &on_device(gpu, &twin, twin.mistake));
+        assert!(error > 10.0, "{}: a planted mistake is not noticed", twin.name);
+    }
+}
+
+/// Names and arguments of the functions in a shader: `fn name(a: f32, b: f32)`.
+fn shader_functions(text: &str) -> Vec<(String, Vec<String>)> {
+    text.lines().filter_map(|line| signature(line.strip_prefix("fn ")?)).collect()
+}
+
+fn signature(text: &str) -> Option<(String, Vec<String>)> {
+    let (name, rest) = text.split_once('(')?;
+    let arguments = rest.split_once(')')?.0.split(',').filter_map(|a| a.split_once(':')).map(|(a, _)| a.trim().into());
+    Some((name.to_string(), arguments.collect()))
+}
+
+#[test]
+fn every_twin_has_its_partner() {
+    let tested: BTreeSet<(String, String)> = twins().iter().map(|t| (t.stem.into(), t.name.into())).collect();
+    let mut found = BTreeSet::new();
+    for path in std::fs::read_dir("shaders/optics").expect("it is there").map(|entry| entry.expect("listed").path()) {
+        let stem = path.file_stem().and_then(|stem| stem.to_str()).expect("a plain name").to_string();
+        let rust = std::fs::read_to_string(format!("src/optics/{stem}.rs"))
+            .unwrap_or_else(|_| panic!("{} has no twin src/optics/{stem}.rs", path.display()));
+        let functions: Vec<_> = rust.lines().filter_map(|line| signature(line.strip_prefix("pub fn ")?)).collect();
+        for function in shader_functions(&std::fs::read_to_string(&path).expect("it is text")) {
+            assert!(
+                functions.contains(&function),
+                "{}: no such pub fn in src/optics/{stem}.rs: {function:?}",
+                path.display()
+            );
+            found.insert((stem.clone(), function.0));
+        }
+        // Who says that it has a twin must have one.
+        let twin = format!("`{stem}.wgsl`");
+        let mut says = false;
+        for line in rust.lines() {
+            says |= line.starts_with("///") && line.contains("Twin") && line.contains(&twin);
+            if let Some((name, _)) = line.strip_prefix("pub fn ").and_then(signature) {
+                let there = found.contains(&(stem.clone(), name.clone()));
+                assert_eq!(says, there, "src/optics/{stem}.rs: what {name} says of its twin");
+                says = false;
+            }
+        }
+    }
+    assert_eq!(found, tested, "twins that are there (left) and tested (right)");
+    assert_eq!(shader_functions("fn a(x: f32) -> f32 {\n}\nfn b(y: f32, z: vec3f) {\n").len(), 2);
+}
