@@ -267,7 +267,8 @@ fn views_from(samples: &[DVec3], corners: &[DVec3], size: u32) -> LightViews {
     let widest = samples
         .iter()
         .flat_map(|s| corners.iter().map(move |c| (center - *s).angle_between(*c - *s)))
-        .fold(0.0, f64::max);
+        // `f64::max` would drop a NaN: a sample at the centre or at a corner, which no frustum serves.
+        .fold(0.0, |widest: f64, angle| if angle.is_nan() { f64::INFINITY } else { widest.max(angle) });
     // A frustum beyond this half angle wastes most of its texels on its rim; a corner at the light itself has no angle.
     let fits = corners.is_empty() || (widest.is_finite() && widest < 60f64.to_radians());
     let near = |s: DVec3| {
