@@ -37,11 +37,11 @@
 //! | [`papers`] | the bibliography; comments cite its keys | |
 //! | [`optics`] | media, Fresnel, gloss, phase functions, albedo of a half space: scalar f64, mm | |
 //! | [`geometry`] | meshes, shapes, sculptures, rays, filters on vertices | |
-//! | [`store`] | the one mechanism: keys, plans, values in memory and on disk, the door for files | its key is new |
+//! | [`store`] | the one mechanism: keys, plans, memory, disk, the door for files | its key is new |
 //! | [`scene`] | RON into a valid [`scene::Scene`]; the only room that knows RON | a file's content changes |
-//! | [`gpu`] | a small vocabulary over wgpu: checked shaders, passes as values | a shader, an input, a uniform or the size changes |
-//! | [`frame`] | what a technique is given, and what follows it: G-buffer, shadows, sky, gloss, sum | see its own table |
-//! | [`techniques`] | one folder = one paper's way, with its manual; one line each in the registry | their bakes: shape, medium or kernel change |
+//! | [`gpu`] | a small vocabulary over wgpu: checked shaders, passes as values | shader, input or size change |
+//! | [`frame`] | what a technique is given, and what follows it | see its own table |
+//! | [`techniques`] | one folder = one paper's way, with its manual | their bakes: shape, medium or kernel change |
 //! | [`render`] | the straight line from scene to image | |
 //! | [`session`] | what a command holds while it works | |
 //! | [`commands`] | the words of the command line | |

@@ -120,7 +120,10 @@ fn flags_that_the_program_asks_for_are_flags_of_some_shader() {
         for path in std::fs::read_dir(folder).expect("the room is there").map(|entry| entry.expect("listed").path()) {
             let Ok(text) = std::fs::read_to_string(&path) else { continue };
             for word in text.split('"').skip(1).step_by(2) {
-                let is_flag = word.len() > 3 && word.chars().all(|c| c.is_ascii_uppercase() || c == '_');
+                // `env!("CARGO_…")` is no flag.
+                let is_flag = word.len() > 3
+                    && !word.starts_with("CARGO_")
+                    && word.chars().all(|c| c.is_ascii_uppercase() || c == '_');
                 if is_flag {
                     asked.insert(word.to_string(), path.display().to_string());
                 }

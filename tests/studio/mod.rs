@@ -68,7 +68,7 @@ impl Studio {
 pub fn read(path: &std::path::Path) -> Scene {
     let reader = Reader::new(Arc::new(Files::default()));
     let (scene, _) = reader.scene(path, &[]).unwrap_or_else(|problems| panic!("{problems}"));
-    render::check(&scene).unwrap_or_else(|problems| panic!("{problems}"));
+    render::check(&scene, &scene.view.technique).unwrap_or_else(|problems| panic!("{problems}"));
     scene
 }
 
