@@ -14,9 +14,11 @@ fn main() -> ExitCode {
     let said = std::panic::catch_unwind(|| commands::answer(std::env::args_os()));
     // The hook has said what there is to say.
     let Said { facts, talk, status } = said.unwrap_or_else(|_| Said::unfinished());
-    let talked = talk.is_empty() || writeln!(std::io::stderr(), "{}", talk.trim_end()).is_ok();
+    if !talk.is_empty() {
+        writeln!(std::io::stderr(), "{}", talk.trim_end()).ok(); // there is no better place to complain
+    }
     match commands::print(&facts) {
-        Ok(()) if talked => ExitCode::from(status),
-        _ => ExitCode::from(status.max(Said::unfinished().status)),
+        Ok(()) => ExitCode::from(status),
+        Err(_) => ExitCode::from(Said::unfinished().status),
     }
 }

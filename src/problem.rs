@@ -40,6 +40,23 @@ impl At {
         }
     }
 
+    /// The part of the line that is shown, and where in it the value begins, 1-based, and how long it is: all of a line
+    /// that somebody wrote, the surroundings of the value in one that a program did.
+    fn excerpt(&self) -> (String, usize, usize) {
+        const WHOLE: usize = 200;
+        const BEFORE: usize = 40;
+        const SHOWN: usize = 120;
+        if self.source.chars().count() <= WHOLE {
+            return (self.source.clone(), self.column, self.width);
+        }
+        let skipped = (self.column - 1).saturating_sub(BEFORE);
+        let rest: String = self.source.chars().skip(skipped).take(SHOWN).collect();
+        let lead = if skipped > 0 { "…" } else { "" };
+        let tail = if self.source.chars().count() > skipped + SHOWN { "…" } else { "" };
+        let column = self.column - skipped + lead.chars().count();
+        (format!("{lead}{rest}{tail}"), column, self.width.min(SHOWN - BEFORE))
+    }
+
     /// A file as a whole (an image, a mesh): no line.
     pub fn file(file: &Path) -> At {
         At { file: file.to_path_buf(), line: 0, column: 0, source: String::new(), width: 1 }
@@ -158,10 +175,10 @@ impl fmt::Display for Problem {
         if let Some(at) = self.at.as_ref().filter(|at| at.line > 0) {
             let number = at.line.to_string();
             let margin = " ".repeat(number.len());
+            let (shown, column, width) = at.excerpt();
             // A tab stays a tab, so that the marks stand under their value.
-            let lead: String =
-                at.source.chars().take(at.column - 1).map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
-            write!(f, "\n{margin} |\n{number} | {}\n{margin} | {lead}{}", at.source, "^".repeat(at.width))?;
+            let lead: String = shown.chars().take(column - 1).map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
+            write!(f, "\n{margin} |\n{number} | {shown}\n{margin} | {lead}{}", "^".repeat(width))?;
             if let Some(hint) = &self.hint {
                 write!(f, "\n{margin} = hint: {hint}")?;
             }
@@ -218,3 +235,25 @@ pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
 /// How long work reports the share that is done, 0 to 1, and learns that nobody waits for it any more: an `Err` is to be
 /// passed up at once.
 pub type Tick<'a> = &'a (dyn Fn(f64) -> Result<(), Problem> + Sync);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_an_enormous_line_the_surroundings_are_shown_with_the_marks_at_their_place() {
+        let text = format!("{}OOPS{}", "(".repeat(5000), ")".repeat(5000));
+        let problem = Problem::files("no").at(At::span(Path::new("a.ron"), &text, 5000..5004)).to_string();
+        let lines: Vec<Vec<char>> = problem.lines().map(|line| line.chars().collect()).collect();
+        assert!(problem.starts_with("a.ron:1:5001: error: no") && lines.iter().all(|line| line.len() < 140));
+        let marks = lines[3].iter().position(|c| *c == '^').unwrap();
+        assert_eq!(lines[2][marks..marks + 4], ['O', 'O', 'P', 'S']);
+        assert!(lines[2][4] == '…' && lines[2].ends_with(&['…']));
+    }
+
+    #[test]
+    fn a_word_of_which_nothing_is_right_is_near_to_none() {
+        assert_eq!(nearest("9", ["a", "ball"]), None);
+        assert_eq!(nearest("bal", ["a", "ball"]), Some("ball"));
+    }
+}

@@ -29,14 +29,20 @@ impl Check {
         let session = Session::new(options);
         let (mut text, mut facts, mut told) = (String::new(), Vec::new(), Vec::new());
         for file in &self.files {
-            match self.one(&session, file) {
+            let found = match self.one(&session, file) {
                 Ok(sound) => {
                     text += &sound.text;
                     facts.push(sound.facts);
-                    told.extend(sound.warnings);
+                    sound.warnings
                 }
-                Err(Problems(found)) => told.extend(found),
-            }
+                Err(Problems(found)) => found,
+            };
+            // Scenes share materials, and a material may be asked for by itself too.
+            found.into_iter().for_each(|problem| {
+                if !told.contains(&problem) {
+                    told.push(problem)
+                }
+            });
         }
         match told.iter().any(Problem::is_error) {
             true => Err(Problems(told)),

@@ -105,11 +105,14 @@ fn story(scene: &Scene, look: &Look, plan: &Plan, states: &[State]) -> String {
     let fates: Vec<Fate> = plan.steps().iter().zip(states).map(|(step, state)| Fate::of(step, *state)).collect();
     let count = |fate: Fate| fates.iter().filter(|f| **f == fate).count();
     let mut text = format!(
-        "{} and {}, {width} x {height} pixels of {samples} x {samples} samples,\nrendered with {}.\n\n",
+        "{} and {}, {width} x {height} pixels{samples},\nrendered with {}.\n\n",
         counted(scene.objects.len(), "object"),
         counted(scene.lights.len(), "light"),
         look.technique.ron,
-        samples = look.view.antialias,
+        samples = match look.view.antialias {
+            1 => String::new(),
+            n => format!(" of {n} x {n} samples"),
+        },
     );
     text += &format!(
         "It takes {}: {} come from disk, {} have to be made, and {} passes are drawn.\n",

@@ -71,6 +71,10 @@ pub fn complaint(error: &clap::Error, json: bool) -> Said {
         let what = format!("`{word}` is not in this version ({})", env!("CARGO_PKG_VERSION"));
         return Said::wrong(&Problem::new(Cause::Words, what).hint(*instead).into(), json);
     }
+    if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        let problem = Problem::new(Cause::Words, "another word is missing").hint("`--help` lists what can follow");
+        return Said { talk: text, ..Said::wrong(&problem.into(), json) };
+    }
     // clap says it well; programs get its parts.
     let (what, rest) = text.split_once("\n\n").unwrap_or((&text, ""));
     let line = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");

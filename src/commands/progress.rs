@@ -100,6 +100,10 @@ impl Watch for Progress {
     }
 
     fn warn(&self, problem: &Problem) {
-        self.warnings.lock().expect("no panic while noting a warning").push(problem.clone());
+        // A bake that cannot be read is looked for whenever something asks for it.
+        let mut warnings = self.warnings.lock().expect("no panic while noting a warning");
+        if !warnings.contains(problem) {
+            warnings.push(problem.clone());
+        }
     }
 }

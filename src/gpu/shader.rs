@@ -194,7 +194,8 @@ struct Joined<'a> {
 fn check(name: &str, key: Key, text: String, lines: &[Line]) -> Result<Shader, Problem> {
     let module = naga::front::wgsl::parse_str(&text).map_err(|error| {
         let span = error.location(&text).map(|l| l.offset as usize..(l.offset + l.length) as usize);
-        let notes: Vec<_> = error.labels().map(|(_, note)| note).filter(|note| !note.is_empty()).collect();
+        let new = |note: &&str| !note.is_empty() && !error.message().contains(*note);
+        let notes: Vec<_> = error.labels().map(|(_, note)| note).filter(new).collect();
         let problem = Problem::files(format!("the shader {name} is wrong: {}", error.message()));
         place(problem, &text, lines, span).hint(if notes.is_empty() {
             "mend it and save".into()

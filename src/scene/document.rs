@@ -53,8 +53,13 @@ pub fn text(file: &File) -> Result<Arc<Source>, Problem> {
         return Err(whole(what).hint("is this a scene or a material?"));
     }
     match std::str::from_utf8(&file.bytes) {
+        Ok(text) if text.trim_start_matches('\u{feff}').trim().is_empty() => {
+            Err(whole("the file is empty".into()).hint("begin with Scene(version: 1, …) or Material(version: 1, …)"))
+        }
         Ok(text) => Ok(Source::of_file(&file.path, text.strip_prefix('\u{feff}').unwrap_or(text).to_string())),
-        Err(_) => Err(whole("the file is not UTF-8 text".into()).hint("is this a scene or a material?")),
+        Err(_) => {
+            Err(whole("the file is not UTF-8 text".into()).hint("is this a scene or a material? Then save it as UTF-8"))
+        }
     }
 }
 

@@ -52,7 +52,10 @@ impl Disk {
         let path = self.path(key);
         let bytes = match std::fs::read(&path) {
             Ok(bytes) => bytes,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            // A file in the folder's place holds no bakes either; writing says so.
+            Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
+                return Ok(None);
+            }
             Err(error) => return Err(self.unreadable(&path, &error.to_string())),
         };
         match parse(&bytes, key) {

@@ -1,0 +1,221 @@
+//! Help, JSON, exit status, and words that mean nothing.
+
+use crate::{Desk, NO_ADAPTER};
+use serde_json::Value;
+
+const COMMANDS: [&str; 9] = ["new", "render", "check", "explain", "techniques", "bake", "media", "cache", "doctor"];
+
+#[test]
+fn without_words_it_says_what_it_is_a_first_session_and_the_rest() {
+    let said = Desk::new().run(&[]).ok();
+    assert!(said.out.starts_with("Diaphane renders translucent things"), "{}", said.out);
+    assert_eq!(said.out.lines().filter(|line| line.starts_with("  diaphane ")).count(), 5);
+    for command in COMMANDS {
+        assert!(said.out.contains(&format!("\n  {command} ")), "{command}");
+    }
+    assert!(said.err.is_empty());
+}
+
+#[test]
+fn every_command_of_the_first_session_works() {
+    let desk = Desk::new();
+    let said = desk.run(&[]).out;
+    let session: Vec<&str> = said.lines().filter_map(|line| line.strip_prefix("  diaphane ")).collect();
+    let draws = desk.draws();
+    for line in session {
+        let words: Vec<&str> = line.split("  ").next().unwrap().split(' ').collect();
+        // Small, but otherwise as it stands.
+        let words = if words[0] == "render" { [&words[..], &["--size", "16x12"]].concat() } else { words };
+        if draws || words[0] != "render" {
+            let ran = desk.run(&words).ok();
+            assert!(ran.err.is_empty(), "{ran:#?}");
+        }
+    }
+    assert_eq!(desk.path("pebble.png").is_file(), draws);
+}
+
+#[test]
+fn every_command_has_help_and_every_flag_of_it_says_what_it_does() {
+    let desk = Desk::new();
+    let all = desk.run(&["--help"]).ok();
+    assert_eq!(all.out, desk.run(&["help"]).ok().out);
+    assert_eq!(all.out, desk.run(&[]).ok().out);
+    let nested = ["media list", "media show", "cache stat", "cache clear"];
+    for command in COMMANDS.iter().chain(&nested) {
+        let words: Vec<&str> = command.split(' ').collect();
+        let help = desk.run(&[&words[..], &["--help"]].concat()).ok();
+        assert_eq!(help.out, desk.run(&[&["help"], &words[..]].concat()).ok().out);
+        assert!(help.out.contains(&format!("Usage: diaphane {command}")), "{}", help.out);
+        for flag in ["--json", "--cache-dir <DIR>", "--no-cache", "--adapter <NAME>", "--set <PATH=RON>"] {
+            assert!(help.out.contains(flag), "{command} {flag}");
+        }
+        let lines: Vec<&str> = help.out.lines().collect();
+        for (i, line) in lines.iter().enumerate() {
+            let entry = line.trim_start();
+            if line.starts_with("  ") && (entry.starts_with('-') || entry.starts_with('<')) {
+                let told = entry.contains("  ") || lines.get(i + 1).is_some_and(|next| next.starts_with("      "));
+                assert!(told, "{command}: {line}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_command_speaks_json_and_nothing_else_on_stdout() {
+    let desk = Desk::new();
+    let ok: [&[&str]; 13] = [
+        &[],
+        &["--help"],
+        &["--version"],
+        &["new", "a"],
+        &["check", "scene.ron", "stone.ron"],
+        &["check", "scene.ron", "--defaults"],
+        &["explain", "scene.ron"],
+        &["bake", "scene.ron"],
+        &["media", "list"],
+        &["media", "show", "marble", "--scene", "scene.ron"],
+        &["techniques", "Opaque"],
+        &["cache", "stat"],
+        &["cache", "clear"],
+    ];
+    for words in ok {
+        let ran = desk.run(&[words, &["--json"]].concat()).ok();
+        assert!(ran.json().is_object() && ran.err.is_empty(), "{ran:#?}");
+    }
+    let wrong: [(&[&str], i32); 9] = [
+        (&["frobnicate"], 2),
+        (&["render"], 2),
+        (&["watch", "scene.ron"], 2),
+        (&["render", "scene.ron", "-o", "x.jpg"], 2),
+        (&["check", "scene.ron", "nothing.ron"], 1),
+        (&["explain", "scene.ron", "--set", "mm_per_unit=NaN"], 2),
+        (&["techniques", "Opake"], 2),
+        (&["media", "show", "marbel"], 2),
+        (&["cache", "stat", "--cache-dir", "scene.ron"], 5),
+    ];
+    for (words, status) in wrong {
+        let (plain, json) = (desk.run(words).fails(status, &[]), desk.run(&[words, &["--json"]].concat()));
+        assert_eq!(json.status, status);
+        assert_eq!(json.err.lines().next(), plain.err.lines().next(), "stderr is the same");
+        let problems = json.json();
+        let problem = &problems["problems"][0];
+        assert!(problem["what"].as_str().is_some_and(|what| !what.is_empty()), "{json:#?}");
+        assert!(problem["hint"].as_str().is_some_and(|hint| !hint.is_empty()), "{json:#?}");
+        assert_eq!(problem["severity"], "error");
+    }
+    let ran = desk.run_with(&NO_ADAPTER, &["doctor", "--json"]);
+    assert_eq!((ran.status, ran.json()["problems"][0]["what"].as_str()), (3, Some("there is no graphics adapter")));
+}
+
+#[test]
+fn a_place_in_a_file_reaches_programs() {
+    let desk = Desk::new();
+    desk.write("bad.ron", "Scene(version: 1,\n  mm_per_unit: -1)");
+    let said = desk.run(&["check", "bad.ron", "--json"]).json();
+    let problem = &said["problems"][0];
+    let expected = serde_json::json!({ "file": "bad.ron", "line": 2, "column": 16, "path": "mm_per_unit" });
+    for (name, value) in expected.as_object().unwrap() {
+        assert_eq!(&problem[name], value);
+    }
+}
+
+#[test]
+fn words_for_a_later_version_are_told_apart_from_misspelt_ones() {
+    let desk = Desk::new();
+    let later: [&[&str]; 8] = [
+        &["watch", "scene.ron", "-o", "a.png"],
+        &["preview", "scene.ron"],
+        &["reference", "merge", "a.exr", "-o", "b.exr"],
+        &["compare", "a.png", "b.png"],
+        &["bench", "scene.ron"],
+        &["media", "profile", "--g", "0"],
+        &["cache", "verify"],
+        &["cache", "gc"],
+    ];
+    for words in later {
+        let ran = desk.run(words).fails(2, &["is not in this version"]);
+        assert!(ran.err.contains("hint: "), "{ran:#?}");
+    }
+    desk.run(&["rendr", "scene.ron"]).fails(2, &["'rendr'", "'render'"]);
+    desk.run(&["media"]).fails(2, &["  list  ", "  show  "]);
+    desk.run(&["render", "scene.ron"]).fails(2, &["--output <FILE>"]);
+    desk.run(&["check"]).fails(2, &["<FILE>"]);
+    desk.run(&["explain", "scene.ron", "--part", "shiny"]).fails(2, &["shiny", "glossy"]);
+}
+
+#[test]
+fn techniques_are_listed_and_explained() {
+    let desk = Desk::new();
+    let list = desk.run(&["techniques"]).ok();
+    for technique in diaphane::techniques::REGISTRY {
+        assert!(list.out.contains(&format!("{}  ", technique.name)), "{}", list.out);
+        let manual = desk.run(&["techniques", technique.name]).ok();
+        assert_eq!(manual.out, desk.run(&["techniques", &technique.name.to_lowercase()]).ok().out);
+        assert!(manual.out.contains("In a scene:") && !manual.out.contains("```"), "{}", manual.out);
+    }
+    desk.run(&["techniques", "FilteredNormals"]).says(&["[Patro2007] R. Patro"]);
+    desk.run(&["techniques", "FiltredNormals"]).fails(2, &["did you mean FilteredNormals?"]);
+    let later = desk.run(&["techniques", "PrecomputedTransfer"]);
+    if later.status != 0 {
+        later.fails(2, &["PrecomputedTransfer is not in this version", "there is Opaque"]);
+    }
+}
+
+#[test]
+fn media_are_listed_and_every_quantity_of_one_is_told() {
+    let desk = Desk::new();
+    let list = desk.run(&["media", "list"]).ok().says(&["skin1", "0.74", "Jensen2001"]);
+    assert!(list.out.lines().count() > 12);
+    let marble =
+        desk.run(&["media", "show", "marble"]).ok().says(&["sigma_s' [1/mm]", "2.19000", "mean free path [mm]"]);
+    // The same medium as a file, but for its name in the first line.
+    let stone = desk.run(&["media", "show", "stone.ron"]).ok();
+    assert_eq!(marble.out.split_once('\n').unwrap().1, stone.out.split_once('\n').unwrap().1);
+    let within = desk.run(&["media", "show", "marble", "--scene", "scene.ron"]).ok();
+    within.says(&["[scene units]", "[pixels]", "share of `ball`"]);
+    let facts = desk.run(&["media", "show", "marble", "--scene", "scene.ron", "--json"]).ok().json();
+    let distance = facts["scattering distance 1/sigma_tr [mm]"][0].as_f64().unwrap();
+    assert!((facts["scene"]["units"][0].as_f64().unwrap() - distance / 10.0).abs() < 1e-12);
+    desk.run(&["media", "show", "marbel"]).fails(2, &["`marbel`", "did you mean `marble`?"]);
+    desk.run(&["media", "show", "scene.ron"]).fails(1, &["scene.ron:1:1", "Material( )"]);
+    desk.run(&["media", "show", "marble", "--scene", "stone.ron"]).fails(1, &["stone.ron:1:1", "Scene( )"]);
+}
+
+#[test]
+fn explain_is_a_plan_that_needs_no_adapter() {
+    let desk = Desk::new();
+    let explain = |more: &[&str]| desk.run_with(&NO_ADAPTER, &[&["explain", "scene.ron"], more].concat()).ok();
+    let text = explain(&[]);
+    text.says(&[
+        "scene.ron: 1 object and 1 light, 24 x 16 pixels",
+        "Opaque()",
+        "The shapes",
+        "The picture",
+        "Left out",
+    ]);
+    assert!(explain(&["--technique", "FilteredNormals()"]).out.lines().all(|line| line.chars().count() <= 120));
+
+    let plan = explain(&["--json"]).json();
+    let names = |value: &Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(&plan), ["skipped", "steps"]);
+    let steps = plan["steps"].as_array().unwrap();
+    let mut seen = Vec::new();
+    for step in steps {
+        assert_eq!(names(step), ["about", "inputs", "key", "name", "state"]);
+        assert!(["run", "memory", "disk"].contains(&step["state"].as_str().unwrap()));
+        assert!(step["inputs"].as_array().unwrap().iter().all(|input| seen.contains(input)), "inputs come first");
+        seen.push(step["key"].clone());
+    }
+    assert!(steps.len() > 5 && steps.iter().all(|step| step["state"] == "run"));
+    // What a scene does not show is skipped, with the reason.
+    let skipped = explain(&["--json", "--set", "objects.ball.visible=false"]).json()["skipped"].clone();
+    assert_eq!(names(&skipped[0]), ["what", "why"]);
+    assert!(skipped[0]["what"].as_str().unwrap().contains("`ball`") && skipped[0]["why"] == "visible: false");
+
+    // After a bake, what was baked is on disk, and what only bakes need does not run either.
+    desk.run_with(&NO_ADAPTER, &["bake", "scene.ron"]).ok();
+    let baked = explain(&["--json"]).json();
+    let on_disk = |plan: &Value| plan["steps"].as_array().unwrap().iter().filter(|s| s["state"] == "disk").count();
+    assert!(on_disk(&baked) > 0 && on_disk(&plan) == 0);
+    assert_eq!(on_disk(&explain(&["--json", "--no-cache"]).json()), 0);
+}
