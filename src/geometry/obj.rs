@@ -1,14 +1,20 @@
 //! Wavefront OBJ: the faces of all groups as one mesh; materials, lines, points and curves are left out.
 //!
-//! What can be repaired is, with a warning that says how often and where first; what cannot is refused at its line.
-//! Every line is read here, and not by a crate, because the two things that users need are lost by readers that hand
-//! back plain arrays: the place of a mistake, and a mesh that is right where only some corners name a normal or a uv.
+//! The crate `tobj` reads the file; here is what comes before and after it.
+//! - Before: a check of every line. What can be repaired is, with a warning that says how often and where first; what
+//!   cannot is refused at its line. tobj says neither where a mistake is nor what it guesses (a corner without a uv gets
+//!   its neighbour's), so it is handed a plain text: the numbers of the file, and faces whose corners count from the
+//!   start and all name as much. Left out are comments behind words and continued lines, which it cannot read, weights
+//!   and colours, and groups, each of which would be a mesh with positions of its own.
+//! - After: its arrays become triangles and vertices. Corners that name the same are one vertex, polygons are clipped,
+//!   faces without an area dropped, and normals without a direction computed.
+//!
 //! The time is linear in the file, but for polygons, whose size is bounded; nothing is reserved that a file only claims.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::path::Path;
-use std::str::FromStr;
+use std::str::{FromStr, SplitWhitespace};
 
 use glam::{Vec2, Vec3};
 
@@ -20,23 +26,26 @@ use crate::problem::{At, Problem};
 /// [`Mesh::with_normals`]), and so are its uvs. Vertices are those that faces use; the same position with another
 /// normal or uv is another vertex. `path` is for messages.
 pub fn read_obj(bytes: &[u8], path: &Path) -> Result<(Mesh, Vec<Problem>), Problem> {
-    let mut obj = Obj::default();
     if bytes.contains(&0) {
         return Err(whole(path, "this is binary data, not OBJ text").hint("export the mesh as Wavefront OBJ"));
     }
+    let mut checked = Checked::default();
+    // Faces may name what comes after them.
+    for (_, line) in lines(bytes) {
+        let keyword = words(&line).next();
+        if let Some(kind) = KEYWORDS.iter().position(|&k| keyword == Some(k)) {
+            checked.totals[kind] += 1;
+        }
+    }
     for (number, line) in lines(bytes) {
-        obj.read(number, &line).map_err(|fault| fault.problem(path, number, &line))?;
+        checked.add(number, &line).map_err(|fault| fault.problem(path, number, &line))?;
     }
-    // Faces may name what comes after them, so only now is it known what exists.
-    if let Some((number, fault)) = obj.out_of_range() {
-        let line = lines(bytes).find(|(n, _)| *n == number).map(|(_, line)| line).unwrap_or_default();
-        return Err(fault.problem(path, number, &line));
-    }
-    if obj.faces.is_empty() {
-        let what = if obj.positions.is_empty() { "there is no mesh in this file" } else { "there are no faces" };
+    if checked.faces.is_empty() {
+        let what = if checked.totals[0] == 0 { "there is no mesh in this file" } else { "there are no faces" };
         return Err(whole(path, what).hint("an OBJ mesh has lines `v x y z` and faces `f 1 2 3`"));
     }
-    obj.mesh(path)
+    let read = checked.read().map_err(|error| whole(path, error.to_string()))?;
+    checked.mesh(&read, path)
 }
 
 fn whole(path: &Path, what: impl Into<String>) -> Problem {
@@ -57,6 +66,11 @@ fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
         }
         Some((i + 1, if joined.is_empty() { line } else { Cow::Owned(joined + &line) }))
     })
+}
+
+/// Without the comment.
+fn words(line: &str) -> SplitWhitespace<'_> {
+    line.split('#').next().unwrap_or_default().split_whitespace()
 }
 
 /// Something wrong at one word of a line.
@@ -110,126 +124,160 @@ impl Count {
     }
 }
 
-/// Position, uv and normal of a face's corner as the file counts them, from 0; `NONE` where it names none.
-type Corner = [u32; 3];
-const NONE: u32 = u32::MAX;
+const KEYWORDS: [&str; 3] = ["v", "vt", "vn"];
 const KINDS: [&str; 3] = ["position", "uv", "normal"];
 
-struct Face {
-    line: usize,
-    corners: std::ops::Range<usize>,
-}
-
+/// A file whose lines have been checked.
 #[derive(Default)]
-struct Obj {
-    positions: Vec<Vec3>,
-    uvs: Vec<Vec2>,
-    normals: Vec<Vec3>,
-    corners: Vec<Corner>,
-    faces: Vec<Face>,
+struct Checked {
+    /// The file in plain form.
+    text: String,
+    /// How many positions, uvs and normals the file holds, and how many of them stand before the next line.
+    totals: [usize; 3],
+    seen: [usize; 3],
+    /// Whether any face names a position, uv or normal.
+    named: [bool; 3],
+    /// The line of each face of the text.
+    faces: Vec<usize>,
     bad_uvs: Count,
+    no_uv: Count,
     short_faces: Count,
     no_faces: Count,
     unknown: Count,
 }
 
-impl Obj {
-    fn read(&mut self, number: usize, line: &str) -> Result<(), Fault> {
-        let mut words = line.split('#').next().unwrap_or("").split_whitespace();
+impl Checked {
+    fn add(&mut self, line_number: usize, line: &str) -> Result<(), Fault> {
+        let mut words = words(line);
         match words.next() {
             Some("v") => {
-                let p = numbers(words, [None, None, None])?;
-                if let Some(i) = p.iter().position(|x| !x.is_finite()) {
+                let (p, bad) = numbers::<3>(words, 3)?;
+                if let Some(i) = bad {
                     let what = format!("the {} coordinate of a position is not a finite number", ["x", "y", "z"][i]);
-                    return Err(Fault {
-                        word: i + 1,
-                        what,
-                        hint: "finite f32 numbers, below 3e38; export the mesh again",
-                    });
+                    let hint = "finite f32 numbers, below 3e38; export the mesh again";
+                    return Err(Fault { word: i + 1, what, hint });
                 }
-                self.positions.push(Vec3::from_array(p));
+                self.hand_on(0, &p);
             }
             Some("vt") => {
-                let uv = Vec2::from_array(numbers(words, [None, Some(0.0)])?);
-                if !uv.is_finite() {
-                    self.bad_uvs.add(number);
+                let (uv, bad) = numbers::<2>(words, 1)?;
+                if bad.is_some() {
+                    self.bad_uvs.add(line_number);
                 }
-                self.uvs.push(if uv.is_finite() { uv } else { Vec2::ZERO });
+                self.hand_on(1, if bad.is_some() { &["0"; 2] } else { &uv });
             }
             // Normals without a direction count as missing, at the corners that name them.
-            Some("vn") => self.normals.push(Vec3::from_array(numbers(words, [None, None, None])?)),
-            Some("f" | "fo") => self.read_face(number, words)?,
-            Some("l" | "p" | "curv" | "curv2" | "surf") => self.no_faces.add(number),
+            Some("vn") => self.hand_on(2, &numbers::<3>(words, 3)?.0),
+            Some("f" | "fo") => self.add_face(line_number, words)?,
+            Some("l" | "p" | "curv" | "curv2" | "surf") => self.no_faces.add(line_number),
             Some(
                 "g" | "o" | "s" | "mg" | "usemtl" | "mtllib" | "vp" | "cstype" | "deg" | "bmat" | "step" | "parm"
                 | "trim" | "hole" | "scrv" | "sp" | "end" | "con" | "bevel" | "c_interp" | "d_interp" | "lod"
                 | "usemap" | "maplib" | "shadow_obj" | "trace_obj" | "ctech" | "stech",
             )
             | None => (),
-            Some(_) => self.unknown.add(number),
+            Some(_) => self.unknown.add(line_number),
         }
         Ok(())
     }
 
-    fn read_face<'w>(&mut self, line: usize, words: impl Iterator<Item = &'w str>) -> Result<(), Fault> {
-        let start = self.corners.len();
-        let counts = [self.positions.len(), self.uvs.len(), self.normals.len()];
+    fn hand_on(&mut self, kind: usize, numbers: &[&str]) {
+        self.seen[kind] += 1;
+        self.text += &format!("{} {}\n", KEYWORDS[kind], numbers.join(" "));
+    }
+
+    /// Every corner names a uv if the file holds any, and a normal; where it names none, one behind the last.
+    fn add_face(&mut self, line_number: usize, words: SplitWhitespace<'_>) -> Result<(), Fault> {
+        if words.clone().count() < 3 {
+            self.short_faces.add(line_number);
+            return Ok(());
+        }
+        self.faces.push(line_number);
+        self.text.push('f');
+        let mut has_uvs = true;
         for (i, word) in words.enumerate() {
-            self.corners.push(corner(word, counts).map_err(|what| Fault {
-                word: i + 1,
-                what,
-                hint: "a corner is v, v/vt, v//vn or v/vt/vn: numbers from 1, or from -1 back from the last one",
-            })?);
-        }
-        if self.corners.len() - start < 3 {
-            self.corners.truncate(start);
-            self.short_faces.add(line);
-        } else {
-            self.faces.push(Face { line, corners: start..self.corners.len() });
-        }
-        Ok(())
-    }
-
-    /// The first corner that names what the file does not hold.
-    fn out_of_range(&self) -> Option<(usize, Fault)> {
-        let counts = [self.positions.len(), self.uvs.len(), self.normals.len()];
-        self.faces.iter().find_map(|face| {
-            self.corners[face.corners.clone()].iter().enumerate().find_map(|(i, corner)| {
-                let kind = (0..3).find(|&k| corner[k] != NONE && corner[k] as usize >= counts[k])?;
-                let what = match counts[kind] {
-                    0 => format!("{} {} is named, but the file has none", KINDS[kind], corner[kind] as u64 + 1),
-                    n => format!("{} {} is named, but the file has only {n}", KINDS[kind], corner[kind] as u64 + 1),
-                };
-                Some((face.line, Fault { word: i + 1, what, hint: "the file may be cut off; export it again" }))
-            })
-        })
-    }
-
-    fn mesh(mut self, path: &Path) -> Result<(Mesh, Vec<Problem>), Problem> {
-        // A uv or normal counts only where it can be used.
-        let has_direction = |n: Vec3| n.is_finite() && n != Vec3::ZERO;
-        let mut no_direction = Count::default();
-        for face in &self.faces {
-            for corner in &mut self.corners[face.corners.clone()] {
-                if corner[2] != NONE && !has_direction(self.normals[corner[2] as usize]) {
-                    corner[2] = NONE;
-                    no_direction.add(face.line);
+            let hint = "a corner is v, v/vt, v//vn or v/vt/vn: numbers from 1, or from -1 back from the last one";
+            let corner = self.corner(word).map_err(|what| Fault { word: i + 1, what, hint })?;
+            has_uvs &= corner[1].is_some();
+            for (kind, index) in corner.into_iter().enumerate() {
+                self.named[kind] |= index.is_some();
+                self.text.push(if kind == 0 { ' ' } else { '/' });
+                if self.totals[kind] > 0 {
+                    self.text += &index.unwrap_or(self.totals[kind] + 1).to_string();
                 }
             }
         }
-        let named = |kind: usize| self.corners.iter().any(|corner| corner[kind] != NONE);
-        let (with_uvs, with_normals) = (named(1), named(2));
+        self.text.push('\n');
+        if !has_uvs {
+            self.no_uv.add(line_number);
+        }
+        Ok(())
+    }
+
+    /// `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from 1.
+    fn corner(&self, word: &str) -> Result<[Option<usize>; 3], String> {
+        let mut corner = [None; 3];
+        let mut parts = word.split('/');
+        for (kind, index) in corner.iter_mut().enumerate() {
+            let Some(part) = parts.next() else { break };
+            if part.is_empty() && kind > 0 {
+                continue;
+            }
+            let number = isize::from_str(part).map_err(|_| format!("`{}` is not a corner of a face", shown(word)))?;
+            let (name, seen, total) = (KINDS[kind], self.seen[kind], self.totals[kind]);
+            let distance = number.unsigned_abs();
+            *index = Some(match number {
+                0 => return Err(format!("{name} 0 does not exist: OBJ counts from 1")),
+                1.. if distance <= total => distance,
+                1.. if total == 0 => return Err(format!("{name} {number} is named, but the file has none")),
+                1.. => return Err(format!("{name} {number} is named, but the file has only {total}")),
+                _ if distance <= seen => seen + 1 - distance,
+                _ => return Err(format!("{name} {number} is named, but only {seen} stand before it")),
+            });
+        }
+        if parts.next().is_some() {
+            return Err(format!("`{}` has more than three parts", shown(word)));
+        }
+        Ok(corner)
+    }
+
+    /// What tobj reads: one mesh, since the text has no groups, that holds what its faces use.
+    fn read(&mut self) -> Result<tobj::Mesh, tobj::LoadError> {
+        // What corners name that name nothing; no direction marks the normals to compute.
+        for (kind, filler) in [(1, "vt 0 0\n"), (2, "vn 0 0 0\n")] {
+            if self.totals[kind] > 0 {
+                self.text += filler;
+            }
+        }
+        let text = std::mem::take(&mut self.text);
+        let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
+        let (mut models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, |_| Ok(Default::default()))?;
+        Ok(models.swap_remove(0).mesh)
+    }
+
+    fn mesh(self, read: &tobj::Mesh, path: &Path) -> Result<(Mesh, Vec<Problem>), Problem> {
+        let positions: Vec<Vec3> = read.positions.chunks_exact(3).map(Vec3::from_slice).collect();
+        let uvs: Vec<Vec2> = read.texcoords.chunks_exact(2).map(Vec2::from_slice).collect();
+        // In f64 every f32 vector has a length; zero stands for no direction.
+        let direction = |n: &[f32]| Vec3::from_slice(n).as_dvec3().normalize_or_zero().as_vec3();
+        let normals: Vec<Vec3> = read.normals.chunks_exact(3).map(direction).collect();
+        let with_normals = normals.iter().any(|&n| n != Vec3::ZERO);
+        // Empty arrays are left out of what corners name.
+        let named = |indices: &[u32], i: usize| indices.get(i).copied().unwrap_or_default();
+        let corner = |i| [read.indices[i], named(&read.texcoord_indices, i), named(&read.normal_indices, i)];
+        let corners: Vec<[u32; 3]> = (0..read.indices.len()).map(corner).collect();
 
         let mut mesh = Mesh::default();
-        let mut vertices: HashMap<Corner, u32> = HashMap::new();
-        let mut undirected: Vec<u32> = Vec::new();
-        let (mut no_area, mut fans, mut no_uv, mut no_normal) =
-            (Count::default(), Count::default(), Count::default(), Count::default());
-        for face in &self.faces {
-            let corners = &self.corners[face.corners.clone()];
-            let places: Vec<_> = corners.iter().map(|c| self.positions[c[0] as usize].as_dvec3()).collect();
+        let mut vertices: HashMap<[u32; 3], u32> = HashMap::new();
+        let (mut no_area, mut fans, mut no_normal) = (Count::default(), Count::default(), Count::default());
+        let mut rest = &corners[..];
+        for (i, &line) in self.faces.iter().enumerate() {
+            // tobj leaves the arities out where all are 3.
+            let (corners, after) = rest.split_at(read.face_arities.get(i).map_or(3, |&arity| arity as usize));
+            rest = after;
+            let places: Vec<_> = corners.iter().map(|c| positions[c[0] as usize].as_dvec3()).collect();
             let triangles = polygon::triangulate(&places).unwrap_or_else(|| {
-                fans.add(face.line);
+                fans.add(line);
                 (1..corners.len() - 1).map(|i| [0, i, i + 1]).collect()
             });
             let has_area = |t: &[usize; 3]| {
@@ -237,29 +285,23 @@ impl Obj {
                 (b - a).cross(c - a).length_squared() > 0.0
             };
             if !triangles.iter().any(has_area) {
-                no_area.add(face.line);
+                no_area.add(line);
                 continue;
             }
-            if with_uvs && corners.iter().any(|c| c[1] == NONE) {
-                no_uv.add(face.line);
-            }
-            if with_normals && corners.iter().any(|c| c[2] == NONE) {
-                no_normal.add(face.line);
+            if self.named[2] && corners.iter().any(|c| normals[c[2] as usize] == Vec3::ZERO) {
+                no_normal.add(line);
             }
             for triangle in triangles.iter().filter(|t| has_area(t)) {
                 mesh.triangles.push(triangle.map(|i| {
                     *vertices.entry(corners[i]).or_insert_with(|| {
                         let [v, vt, vn] = corners[i];
                         let new = mesh.positions.len() as u32;
-                        mesh.positions.push(self.positions[v as usize]);
-                        if with_uvs {
-                            mesh.uvs.push(self.uvs.get(vt as usize).copied().unwrap_or_default());
+                        mesh.positions.push(positions[v as usize]);
+                        if self.named[1] {
+                            mesh.uvs.push(uvs[vt as usize]);
                         }
                         if with_normals {
-                            // In f64 every f32 vector has a length.
-                            let normal = self.normals.get(vn as usize).map(|n| n.as_dvec3().normalize().as_vec3());
-                            undirected.extend(normal.is_none().then_some(new));
-                            mesh.normals.push(normal.unwrap_or_default());
+                            mesh.normals.push(normals[vn as usize]);
                         }
                         new
                     })
@@ -269,20 +311,15 @@ impl Obj {
         if mesh.triangles.is_empty() {
             return Err(whole(path, "none of the faces has an area").hint("the mesh is flattened to a line or a point"));
         }
-        if !undirected.is_empty() {
+        if mesh.normals.contains(&Vec3::ZERO) {
             let smooth = mesh.smooth_normals();
-            for v in undirected {
-                mesh.normals[v as usize] = smooth[v as usize];
+            for (normal, smooth) in mesh.normals.iter_mut().zip(smooth).filter(|pair| *pair.0 == Vec3::ZERO) {
+                *normal = smooth;
             }
         }
-        // Faces whose normals have no direction have been counted once already.
-        no_normal.times = if no_direction.times > 0 { 0 } else { no_normal.times };
-
-        let mut used = vec![false; self.positions.len()];
-        for corner in &self.corners {
-            used[corner[0] as usize] = true;
-        }
-        let unused = Count { times: used.iter().filter(|used| !**used).count(), first: 0 };
+        // tobj keeps the positions that faces name.
+        let unused = Count { times: self.totals[0] - positions.len(), first: 0 };
+        let no_uv = if self.named[1] { self.no_uv } else { Count::default() };
         let repairs = [
             (unused, "vertex belongs", "vertices belong", "to no face; left out"),
             (no_area, "face has", "faces have", "no area; dropped"),
@@ -291,8 +328,7 @@ impl Obj {
             (fans, "polygon has", "polygons have", "too many corners; cut as a fan, right only where it is convex"),
             (self.bad_uvs, "uv is", "uvs are", "not finite; set to (0, 0)"),
             (no_uv, "face has", "faces have", "corners without a uv; set to (0, 0)"),
-            (no_direction, "corner has", "corners have", "a normal without a direction; computed from the faces"),
-            (no_normal, "face has", "faces have", "corners without a normal; computed from the faces"),
+            (no_normal, "face has", "faces have", "corners without a usable normal; computed from the faces"),
             (self.unknown, "line is", "lines are", "of a kind that OBJ does not have; skipped"),
         ];
         let warnings = repairs.into_iter().filter(|repair| repair.0.times > 0).map(|(count, one, many, what)| {
@@ -304,55 +340,28 @@ impl Obj {
     }
 }
 
-/// As many numbers as there are places; a place with a value may be missing, and more words may follow (weights,
-/// colours).
-fn numbers<'w, const N: usize>(
-    mut words: impl Iterator<Item = &'w str>,
-    default: [Option<f32>; N],
-) -> Result<[f32; N], Fault> {
-    let mut found = [0.0; N];
-    for (i, (number, default)) in found.iter_mut().zip(default).enumerate() {
-        *number = match (words.next(), default) {
-            (Some(word), _) => f32::from_str(word).map_err(|_| Fault {
-                word: i + 1,
-                what: format!("`{}` is not a number", shown(word)),
-                hint: "numbers like 1.5 or -2e-3, parted by spaces",
-            })?,
-            (None, Some(default)) => default,
-            (None, None) => {
-                let what = format!("{i} numbers, but {N} are needed");
-                return Err(Fault { word: 0, what, hint: "the file may be cut off; export it again" });
+/// The words of `N` numbers, and the place of the first that is not finite. Only `needed` of them must be there, the
+/// others are 0; more words may follow (weights, colours).
+fn numbers<const N: usize>(mut words: SplitWhitespace<'_>, needed: usize) -> Result<([&str; N], Option<usize>), Fault> {
+    let mut found = ["0"; N];
+    let mut bad = None;
+    for (i, place) in found.iter_mut().enumerate() {
+        let Some(word) = words.next() else {
+            if i >= needed {
+                break;
             }
+            let what = format!("{i} numbers, but {needed} are needed");
+            return Err(Fault { word: 0, what, hint: "the file may be cut off; export it again" });
         };
+        let number = f32::from_str(word).map_err(|_| Fault {
+            word: i + 1,
+            what: format!("`{}` is not a number", shown(word)),
+            hint: "numbers like 1.5 or -2e-3, parted by spaces",
+        })?;
+        bad = bad.or((!number.is_finite()).then_some(i));
+        *place = word;
     }
-    Ok(found)
-}
-
-/// `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from 0; whether positive ones exist is told later.
-fn corner(word: &str, counts: [usize; 3]) -> Result<Corner, String> {
-    let mut corner = [NONE; 3];
-    let mut parts = word.split('/');
-    for (kind, (index, count)) in corner.iter_mut().zip(counts).enumerate() {
-        let Some(part) = parts.next() else { break };
-        if part.is_empty() && kind > 0 {
-            continue;
-        }
-        let number = i64::from_str(part).map_err(|_| format!("`{}` is not a corner of a face", shown(word)))?;
-        let from_zero = match number {
-            0 => return Err(format!("{} 0 does not exist: OBJ counts from 1", KINDS[kind])),
-            1.. => number - 1,
-            _ if number.unsigned_abs() as usize <= count => count as i64 + number,
-            _ => return Err(format!("{} {number} is named, but only {count} stand before it", KINDS[kind])),
-        };
-        *index = u32::try_from(from_zero)
-            .ok()
-            .filter(|&i| i != NONE)
-            .ok_or_else(|| format!("{} {number} is beyond what a mesh can hold", KINDS[kind]))?;
-    }
-    if parts.next().is_some() {
-        return Err(format!("`{}` has more than three parts", shown(word)));
-    }
-    Ok(corner)
+    Ok((found, bad))
 }
 
 #[cfg(test)]

@@ -67,13 +67,33 @@ fn what_is_written_is_read() {
 }
 
 #[test]
-fn agrees_with_another_reader() {
+fn a_plain_file_is_as_tobj_reads_it() {
     let text = write(&shapes::torus(1.0, 0.3, (8, 6)));
     let options = tobj::LoadOptions { single_index: true, triangulate: true, ..Default::default() };
     let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, |_| Ok(Default::default())).unwrap();
     let (theirs, ours) = (&models[0].mesh, clean(&text));
     assert_eq!(theirs.indices, ours.triangles.concat());
     assert_eq!(theirs.positions, ours.positions.iter().flat_map(|p| p.to_array()).collect::<Vec<_>>());
+}
+
+#[test]
+fn what_tobj_would_misread_is_read() {
+    // A corner without a uv does not get its neighbour's, nor one without a normal.
+    let (mesh, _) = read(&format!("{SQUARE}vt 1 1\nvn 0 1 0\nf 1/1/1 2 3//1\nf 1 3/1 4\n")).unwrap();
+    let (uv, normal) = (|v: usize| mesh.uvs[v] == Vec2::ONE, |v: usize| mesh.normals[v] == Vec3::Y);
+    let first = mesh.triangles[0].map(|v| (uv(v as usize), normal(v as usize)));
+    let second = mesh.triangles[1].map(|v| (uv(v as usize), normal(v as usize)));
+    assert_eq!(first, [(true, true), (false, false), (false, true)]);
+    assert_eq!(second, [(false, false), (true, false), (false, false)]);
+    // Groups share their vertices, and name what comes after them.
+    let grouped = clean(&format!("g a\nf 1 2 3\ng b\nusemtl c\nf 1 3 4\n{SQUARE}"));
+    assert_eq!((grouped.positions.len(), grouped.area()), (4, 1.0));
+    // Words that it refuses, or takes for a scale.
+    for more in ["0", "2", "1 1", "1 0 0", "1 1 1 1"] {
+        let mesh =
+            clean(&format!("{SQUARE}v 2 2 2 {more}\nvt 0.5\nvn 1 0 0 0\nusemtl\nf 1 2 3 4\nf 5 2 1 # the end\n"));
+        assert_eq!((mesh.positions[4], mesh.triangles.len()), (Vec3::splat(2.0), 3));
+    }
 }
 
 #[test]
@@ -109,7 +129,7 @@ fn repairs_are_told_and_counted() {
         ("facet 1 2 3\n", "1 line is of a kind that OBJ does not have"),
         ("vt nan 0\n", "1 uv is not finite"),
         ("vt 0 1\nf 1/1 2/1 3/1\n", "1 face has corners without a uv"),
-        ("vn 0 0 -1\nf 1//1 3//1 2//1\n", "1 face has corners without a normal"),
+        ("vn 0 0 -1\nf 1//1 3//1 2//1\n", "1 face has corners without a usable normal"),
     ] {
         let (mesh, told) = warning(&format!("{SQUARE}{face}{more}"));
         assert!(told.contains(about) && told.starts_with("m.obj:"), "{told}");
@@ -117,7 +137,7 @@ fn repairs_are_told_and_counted() {
     }
     for normal in ["0 0 0", "nan 0 1", "inf 0 0"] {
         let (mesh, told) = warning(&format!("{SQUARE}vn {normal}\nvn 0 1 0\nf 1//2 2//1 3//2\nf 1//2 3//2 4//2\n"));
-        assert!(told.contains("1 corner has a normal without a direction"), "{told}");
+        assert!(told.contains("1 face has corners without a usable normal"), "{told}");
         assert_eq!(mesh.normals[0], Vec3::Y);
         assert_eq!(mesh.normals[1], Vec3::Z);
         assert_eq!(mesh.clone().with_normals(Normals::Auto), mesh);
@@ -154,9 +174,9 @@ fn what_cannot_be_repaired_is_refused_at_its_line() {
         ("v 0 0 0\nf 1 1//9 1\n", "m.obj:2:5: ", "normal 9 is named"),
         ("v 0 0 0\nf 1 -2 1\n", "m.obj:2:5: ", "position -2 is named, but only 1 stand before it"),
         ("v 0 0 0\nf 1 0 1\n", "m.obj:2:5: ", "OBJ counts from 1"),
-        ("v 0 0 0\nf 1 99999999999 1\n", "m.obj:2:5: ", "beyond what a mesh can hold"),
+        ("v 0 0 0\nf 1 99999999999 1\n", "m.obj:2:5: ", "position 99999999999 is named, but the file has only 1"),
         ("v 0 0 0\nf 1 99999999999999999999999 1\n", "m.obj:2:5: ", "not a corner"),
-        ("v 0 0 0\nf 1/1/1/1 1 1\n", "m.obj:2:3: ", "more than three parts"),
+        ("v 0 0 0\nvt 0 0\nvn 0 0 1\nf 1/1/1/1 1 1\n", "m.obj:4:3: ", "more than three parts"),
         ("v 0 0 0\nf x 1 1\n", "m.obj:2:3: ", "`x` is not a corner"),
     ] {
         let told = refused(text);
