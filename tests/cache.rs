@@ -1,10 +1,12 @@
 //! Bakes on disk survive whatever happens to files: what is read is what was written, or it is made again.
 
+use assert_cmd::cargo::cargo_bin;
 use diaphane::problem::Problem;
 use diaphane::store::{Bake, Disk, Finished, Origin, Plan, Run, Slot, Step, Store, Watch};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
 use std::sync::Mutex;
 use std::time::{Duration, SystemTime};
 
@@ -210,4 +212,44 @@ fn only_old_unfinished_files_and_nothing_foreign_is_swept() {
     Disk::new(folder.path()).clear().unwrap();
     assert_eq!(paths(folder.path()), Vec::<PathBuf>::new());
     assert!(files[2].exists() && files[3].exists());
+}
+
+fn diaphane(folder: &Path, words: &[&str]) -> Command {
+    let mut command = Command::new(cargo_bin!("diaphane"));
+    command.current_dir(folder).args(words).args(["--cache-dir", "bakes"]);
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+fn text(output: &Output) -> String {
+    format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
+}
+
+fn is_sound(folder: &Path) -> usize {
+    let output = diaphane(folder, &["cache", "verify"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    paths(&folder.join("bakes")).len()
+}
+
+#[test]
+fn broken_bakes_are_told_removed_and_collected_by_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let bakes = folder.path().join("bakes");
+    ask(Disk::new(&bakes));
+    std::fs::write(&paths(&bakes)[0], "not a bake").unwrap();
+    let run = |words: &[&str]| {
+        let output = diaphane(folder.path(), words).output().unwrap();
+        (output.status.code().unwrap(), text(&output))
+    };
+    let (status, said) = run(&["cache", "verify"]);
+    assert!(status == 1 && said.contains("broken") && said.contains("made again"), "{status} {said}");
+    assert_eq!(paths(&bakes).len(), LENGTHS.len(), "verify alone removes nothing");
+    let (status, said) = run(&["cache", "verify", "--remove"]);
+    assert!(status == 0 && said.contains("removed"), "{status} {said}");
+    assert_eq!(is_sound(folder.path()), LENGTHS.len() - 1);
+    assert_eq!(run(&["cache", "gc"]).0, 0);
+    assert_eq!(paths(&bakes).len(), LENGTHS.len() - 1);
+    assert_eq!(run(&["cache", "gc", "--max-size", "0"]).0, 0);
+    assert_eq!(paths(&bakes).len(), 0);
+    assert_eq!(run(&["cache", "gc", "--max-size", "lots"]).0, 2);
 }
