@@ -29,15 +29,13 @@ Exit status:
 `diaphane help COMMAND` says more of each.";
 
 /// Words that will mean something, and what does something like it by now.
-const LATER: [(&str, &str); 8] = [
+const LATER: [(&str, &str); 6] = [
     ("watch", "run `diaphane render` after each edit: what did not change comes from the cache"),
     ("preview", "`diaphane render SCENE -o OUT.png` makes a picture"),
     ("reference", "`diaphane render SCENE -o OUT.exr` makes a picture by a real-time technique"),
     ("compare", "`diaphane render SCENE -o OUT.exr` writes linear light, for other programs to compare"),
     ("bench", "`diaphane render SCENE -o OUT.png --timings` says what each step took"),
     ("profile", "`diaphane media show NAME` prints what follows from a medium"),
-    ("verify", "a bake that is damaged is noticed when it is read, and made again"),
-    ("gc", "`diaphane cache clear` removes all bakes; they are made again when they are needed"),
 ];
 
 /// Whether words that cannot be read ask for JSON.

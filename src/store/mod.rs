@@ -11,7 +11,7 @@ mod key;
 mod plan;
 mod run;
 
-pub use disk::{Disk, Entry};
+pub use disk::{Disk, Entry, Swept};
 pub use files::{File, Files};
 pub use get::{Finished, Origin, State, Store, Watch};
 pub use key::Key;
