@@ -216,10 +216,11 @@ impl Checked {
 
     /// `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from 1.
     fn corner(&self, word: &str) -> Result<[Option<usize>; 3], String> {
+        if word.split('/').nth(3).is_some() {
+            return Err(format!("`{}` has more than three parts", shown(word)));
+        }
         let mut corner = [None; 3];
-        let mut parts = word.split('/');
-        for (kind, index) in corner.iter_mut().enumerate() {
-            let Some(part) = parts.next() else { break };
+        for (kind, (index, part)) in corner.iter_mut().zip(word.split('/')).enumerate() {
             if part.is_empty() && kind > 0 {
                 continue;
             }
@@ -234,9 +235,6 @@ impl Checked {
                 _ if distance <= seen => seen + 1 - distance,
                 _ => return Err(format!("{name} {number} is named, but only {seen} stand before it")),
             });
-        }
-        if parts.next().is_some() {
-            return Err(format!("`{}` has more than three parts", shown(word)));
         }
         Ok(corner)
     }
