@@ -96,6 +96,14 @@ impl Frame<'_> {
 
     /// How much of each lamp that casts shadows every pixel sees: an array of layers. None when no lamp does.
     pub(crate) fn visibility(&self, plan: &mut Plan, gbuffer: Slot<Images>) -> Result<Option<Slot<Images>>, Problem> {
+        if let Some(planned) = self.visibility.get() {
+            return Ok(*planned);
+        }
+        let planned = self.plan_visibility(plan, gbuffer)?;
+        Ok(*self.visibility.get_or_init(|| planned))
+    }
+
+    fn plan_visibility(&self, plan: &mut Plan, gbuffer: Slot<Images>) -> Result<Option<Slot<Images>>, Problem> {
         let lamps = self.lamps();
         let Some(lights) = self.lights_bind() else { return Ok(None) };
         let mut layers = Vec::new();

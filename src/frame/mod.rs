@@ -99,6 +99,8 @@ pub struct Frame<'a> {
     pub(crate) items: Vec<Item>,
     clip_from_eye: DMat4,
     camera: tables::Camera,
+    /// The visibility of the lamps, once it was asked for: many views are costly to plan again.
+    visibility: std::cell::OnceCell<Option<Slot<Images>>>,
 }
 
 impl<'a> Frame<'a> {
@@ -142,8 +144,15 @@ impl<'a> Frame<'a> {
         for light in scene.lights.iter().filter(|light| !light.enabled) {
             plan.skip(format!("the light `{}`", light.name), "enabled: false");
         }
-        let mut frame =
-            Frame { scene, view, shaders, items, clip_from_eye: DMat4::IDENTITY, camera: Frame::camera(view) };
+        let mut frame = Frame {
+            scene,
+            view,
+            shaders,
+            items,
+            clip_from_eye: DMat4::IDENTITY,
+            camera: Frame::camera(view),
+            visibility: Default::default(),
+        };
         frame.clip_from_eye = frame.projection() * frame.rotation();
         frame.camera.clip_from_eye = frame.clip_from_eye.as_mat4();
         frame.cull(plan);
