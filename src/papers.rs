@@ -11,6 +11,7 @@ const fn paper(key: &'static str, text: &'static str) -> Paper {
 }
 
 pub const PAPERS: &[Paper] = &[
+    paper("Botsch2004", "M. Botsch & L. Kobbelt. A Remeshing Approach to Multiresolution Modeling. SGP 2004"),
     paper("Chandrasekhar1960", "S. Chandrasekhar. Radiative Transfer. Dover, 1960"),
     paper(
         "Cigolle2014",
@@ -21,6 +22,11 @@ pub const PAPERS: &[Paper] = &[
         "E. d'Eon & G. Irving. A Quantized-Diffusion Model for Rendering Translucent Materials. SIGGRAPH 2011",
     ),
     paper(
+        "Doi1991",
+        "A. Doi & A. Koide. An Efficient Method of Triangulating Equi-Valued Surfaces by Using Tetrahedral Cells. IEICE E74, 1991",
+    ),
+    paper("Dupuy2023", "J. Dupuy & A. Benyoub. Sampling Visible GGX Normals with Spherical Caps. CGF 42(8), 2023"),
+    paper(
         "Francois2006",
         "G. François, S. Pattanaik, K. Bouatouch & G. Breton. Subsurface Texture Mapping. IRISA PI 1806, 2006",
     ),
@@ -29,20 +35,28 @@ pub const PAPERS: &[Paper] = &[
         "Heitz2014",
         "E. Heitz. Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs. JCGT 3(2), 2014",
     ),
+    paper("Henyey1941", "L. Henyey & J. Greenstein. Diffuse Radiation in the Galaxy. Astrophysical Journal 93, 1941"),
     paper(
         "Jensen2001",
         "H. W. Jensen, S. Marschner, M. Levoy & P. Hanrahan. A Practical Model for Subsurface Light Transport. SIGGRAPH 2001",
     ),
     paper("Karis2013", "B. Karis. Real Shading in Unreal Engine 4. SIGGRAPH 2013 course on physically based shading"),
+    paper("Keinert2015", "B. Keinert et al. Spherical Fibonacci Mapping. ACM TOG 34(6), 2015"),
+    paper("Khronos2024", "Khronos Group. Khronos PBR Neutral Tone Mapper, 2024"),
     paper(
         "Maisch2020",
         "S. Maisch & T. Ropinski. Interactive Subsurface Scattering for Materials With High Scattering Distances. CGF 39(6), 2020",
     ),
+    paper("Meisters1975", "G. H. Meisters. Polygons Have Ears. American Mathematical Monthly 82(6), 1975"),
     paper("OpenPBR2024", "Academy Software Foundation. OpenPBR Surface 1.1, 2024"),
     paper("Patro2007", "R. Patro. Real-Time Approximate Subsurface Scattering. 2007"),
     paper(
         "Ramamoorthi2001",
         "R. Ramamoorthi & P. Hanrahan. An Efficient Representation for Irradiance Environment Maps. SIGGRAPH 2001",
+    ),
+    paper(
+        "Thurmer1998",
+        "G. Thürmer & C. Wüthrich. Computing Vertex Normals from Polygonal Facets. Journal of Graphics Tools 3(1), 1998",
     ),
     paper(
         "Tomaszewska2012",

@@ -221,6 +221,11 @@ impl fmt::Display for Problems {
 
 impl std::error::Error for Problems {}
 
+/// A number of things, in words: `1 view`, `96 views`.
+pub fn counted(number: usize, thing: &str) -> String {
+    format!("{number} {thing}{}", if number == 1 { "" } else { "s" })
+}
+
 /// The word in `known` that `word` was probably meant to be.
 pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let lower = word.to_lowercase();

@@ -2,7 +2,7 @@
 
 use crate::gpu::{Gpu, Shaders};
 use crate::image::Image;
-use crate::problem::{Cause, Problem, Problems};
+use crate::problem::{Cause, Problem, Problems, counted};
 use crate::render::{self, Look};
 use crate::scene::{Reader, Scene};
 use crate::store::{Disk, Files, Plan, Slot, Store, Watch};
@@ -62,8 +62,9 @@ impl Session {
         }
     }
 
-    /// A scene with all that it names, and what is to be said of it.
+    /// A scene with all that it names, and what is to be said of it. Shaders are looked at anew with it.
     pub fn scene(&self, path: &Path) -> Result<(Scene, Vec<Problem>), Problems> {
+        self.shaders.look_again();
         self.reader.scene(path, &self.options.sets)
     }
 
@@ -84,7 +85,8 @@ impl Session {
         let image = self.get(&plan, picture, watch)?;
         if let Some(bad) = image.non_finite() {
             let (x, y) = bad.first;
-            let what = format!("{} pixel(s) of the picture hold no number, the first at {x}, {y}", bad.count);
+            let what =
+                format!("{} of the picture without a number, the first at {x}, {y}", counted(bad.count, "pixel"));
             return Err(Problem::new(Cause::Unfinished, what)
                 .hint("this is a mistake in the program or in a shader that was edited; nothing was written"));
         }

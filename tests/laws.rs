@@ -460,8 +460,8 @@ fn an_image_of_the_sky_lights_what_faces_it() {
         from(&mut studio, "(-4, 0, 0)", 0.0),
     );
     assert!(lit > 1.5 * side && side > 3.0 * dark, "from +x {lit}, from the side {side}, from -x {dark}");
-    // A quarter turn brings what was at +x to +z, and back with the opposite sign.
-    let (turned, back) = (from(&mut studio, "(0, 0, 4)", 90.0), from(&mut studio, "(0, 0, -4)", -90.0));
+    // A quarter turn about y brings what was at +x to -z, as it does for an object, and to +z with the opposite sign.
+    let (turned, back) = (from(&mut studio, "(0, 0, -4)", 90.0), from(&mut studio, "(0, 0, 4)", -90.0));
     assert!((turned / lit - 1.0).abs() < 0.05 && (back / lit - 1.0).abs() < 0.05, "{turned} and {back} of {lit}");
 }
 

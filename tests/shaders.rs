@@ -2,6 +2,7 @@
 
 use diaphane::gpu::{Shader, Shaders};
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Flags that make no sense alone: the second is always there when the first is.
@@ -116,9 +117,13 @@ fn flags_that_the_program_asks_for_are_flags_of_some_shader() {
         known.extend(flags_of(name, &mut BTreeSet::new()));
     }
     let mut asked: BTreeMap<String, String> = BTreeMap::new();
-    for folder in ["src/frame", "src/techniques", "src/techniques/opaque", "src/techniques/filtered_normals"] {
+    let mut folders = vec![PathBuf::from("src/frame"), PathBuf::from("src/techniques")];
+    while let Some(folder) = folders.pop() {
         for path in std::fs::read_dir(folder).expect("the room is there").map(|entry| entry.expect("listed").path()) {
-            let Ok(text) = std::fs::read_to_string(&path) else { continue };
+            let Ok(text) = std::fs::read_to_string(&path) else {
+                folders.push(path);
+                continue;
+            };
             for word in text.split('"').skip(1).step_by(2) {
                 // `env!("CARGO_…")` is no flag.
                 let is_flag = word.len() > 3

@@ -38,6 +38,11 @@ fn eye_from_object(object: Object, p: vec3f) -> vec3f {
     return (object.eye_from_object * vec4f(p, 1.0)).xyz;
 }
 
+// Where a point of eye space lies in the picture. Passes that draw on exactly the G-buffer's surfaces need it to the bit.
+fn project(camera: Camera, p: vec3f) -> vec4f {
+    return camera.clip_from_eye * vec4f(p, 1.0);
+}
+
 fn turned(object: Object, n: vec3f) -> vec3f {
     return (object.eye_from_object * vec4f(n, 0.0)).xyz;
 }

@@ -20,7 +20,7 @@ const PI: f32 = 3.14159265358979;
 
 // Where an image holds a direction: x to the right from -z through +x, y downwards from +y.
 fn sky_uv(direction: vec3f) -> vec2f {
-    let turned = atan2(direction.x, -direction.z) - sky.rotation;
+    let turned = atan2(direction.x, -direction.z) + sky.rotation;
     return vec2f(0.5 + turned / (2.0 * PI), acos(clamp(direction.y, -1.0, 1.0)) / PI);
 }
 

@@ -16,7 +16,7 @@ struct Vertex {
 fn vertex(@builtin(instance_index) index: u32, @location(0) position: vec3f) -> Vertex {
     var out: Vertex;
     out.position = eye_from_object(objects[index], position);
-    out.clip = camera.clip_from_eye * vec4f(out.position, 1.0);
+    out.clip = project(camera, out.position);
     out.object = index;
     return out;
 }

@@ -39,7 +39,7 @@ fn vertex(
 ) -> Vertex {
     var out: Vertex;
     out.position = eye_from_object(objects[index], position);
-    out.clip = camera.clip_from_eye * vec4f(out.position, 1.0);
+    out.clip = project(camera, out.position);
     out.normal = turned(objects[index], normal);
     out.object = index;
 #if ENVIRONMENT

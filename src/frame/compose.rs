@@ -1,8 +1,7 @@
 //! What follows the techniques: gloss, what passes through, the sum, and the picture.
 
-use super::shape::{self, Stream};
-use super::{DEPTH, Frame, Item, PACKED, POSITION, Part, Thing, tables};
-use crate::gpu::{Bind, Blend, Depth, Format, Fullscreen, Gpu, Images, Layer, Raster, Sampler};
+use super::{Frame, PACKED, POSITION, Part, Thing, tables};
+use crate::gpu::{Bind, Blend, Depth, Format, Fullscreen, Gpu, Images, Layer, Raster};
 use crate::image::Image;
 use crate::problem::Problem;
 use crate::scene::Substance;
@@ -14,79 +13,6 @@ use serde::Serialize;
 const THICK: f64 = 18.5;
 
 impl Frame<'_> {
-    /// Light reflected at the boundaries, added once for every technique. None when nothing mirrors.
-    pub(crate) fn gloss(&self, plan: &mut Plan, gbuffer: Slot<Images>) -> Result<Option<Slot<Images>>, Problem> {
-        if !self.view.part.has(Part::Glossy) {
-            plan.skip("gloss", "the picture shows another part");
-            return Ok(None);
-        }
-        let mirrors = |item: &Item| self.material(item).is_some_and(|m| m.surface.ior != 1.0 || !self.view.skip);
-        for item in self.items.iter().filter(|item| self.material(item).is_some() && !mirrors(item)) {
-            plan.skip(format!("gloss of `{}`", item.name), "its index of refraction is 1");
-        }
-        let sky = self.sky_binds(plan, true);
-        let lights = self.lights_bind();
-        if lights.is_none() && sky.is_none() || !self.items.iter().any(|item| item.in_view && mirrors(item)) {
-            return Ok(None);
-        }
-        let mut flags = Vec::new();
-        let mut binds = vec![
-            ("camera", self.camera_bind()),
-            ("objects", self.objects_bind()),
-            ("packed_map", Bind::Texture(gbuffer, PACKED)),
-        ];
-        if let Some(lights) = lights {
-            flags.push("LIGHTS");
-            binds.push(("lights", lights));
-        }
-        if let Some(visibility) = self.visibility(plan, gbuffer)? {
-            flags.push("SHADOWS");
-            binds.push(("visibility", Bind::Texture(visibility, 0)));
-        }
-        if let Some(sky) = sky {
-            flags.extend(sky.flags);
-            binds.extend(sky.binds);
-            binds.push(("albedo_table", Bind::Texture(self.gloss_albedos(plan), 0)));
-            binds.push(("linear", Bind::Sampler(Sampler::Linear)));
-        }
-        // Those whose sky is partly hidden bring how open it is with their vertices; the others do without.
-        let mut open = Vec::new();
-        let mut hidden = Vec::new();
-        for (place, item) in self.items.iter().enumerate().filter(|(_, item)| item.in_view && mirrors(item)) {
-            let openness = self.openness(plan, item)?;
-            let mut streams = vec![shape::upload(plan, item.mesh, Stream::Positions)];
-            streams.extend(openness);
-            let draw = crate::gpu::Draw {
-                streams,
-                indices: shape::upload(plan, item.mesh, Stream::Indices),
-                instance: place as u32,
-            };
-            if openness.is_some() { hidden.push(draw) } else { open.push(draw) }
-        }
-        let mut made = Vec::new();
-        for (draws, occluded) in [(hidden, true), (open, false)] {
-            if draws.is_empty() {
-                continue;
-            }
-            let mut flags = flags.clone();
-            if occluded {
-                flags.push("OCCLUDED");
-            }
-            made.push(plan.add(Raster {
-                name: "frame.gloss",
-                about: format!("light mirrored by {} thing(s)", draws.len()),
-                shader: self.shaders.load("frame/gloss.wgsl", &flags)?,
-                size: self.view.sampled_size(),
-                targets: vec![(Format::Rgba32Float, Blend::Replace)],
-                depth: Depth::Equal(gbuffer, DEPTH),
-                layers: vec![Layer { binds: Vec::new(), draws }],
-                array: false,
-                binds: binds.clone(),
-            }));
-        }
-        self.merge(plan, &made)
-    }
-
     /// One map from several that are 0 where another is not. None of none.
     pub(crate) fn merge(&self, plan: &mut Plan, maps: &[Slot<Images>]) -> Result<Option<Slot<Images>>, Problem> {
         let Some((first, rest)) = maps.split_first() else { return Ok(None) };
@@ -133,7 +59,7 @@ impl Frame<'_> {
             size: self.view.sampled_size(),
             targets: vec![(Format::Rgba16Float, Blend::Add)],
             depth: Depth::Off,
-            layers: vec![Layer { binds: Vec::new(), draws }],
+            layers: vec![Layer::meshes(draws)],
             array: false,
             binds: vec![("camera", self.camera_bind()), ("objects", self.objects_bind())],
         })))

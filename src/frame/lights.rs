@@ -4,10 +4,10 @@
 //! frustum has one shadow map, fitted to it; one that stands among the casters has the six faces of a cube. Nothing is
 //! tuned per scene: offsets follow from the size of a texel.
 
-use super::shape::{self, Stream};
+use super::upload::{self, Stream};
 use super::{Frame, Item, PACKED, POSITION, Thing, tables};
-use crate::gpu::{Bind, Depth, Draw, Format, Images, Layer, Raster, Sampler};
-use crate::problem::Problem;
+use crate::gpu::{Bind, Cover, Depth, Draw, Format, Images, Layer, Raster, Sampler};
+use crate::problem::{Problem, counted};
 use crate::scene::{Light, LightKind};
 use crate::store::{Plan, Slot};
 use glam::{DMat4, DVec3, DVec4};
@@ -131,7 +131,7 @@ impl Frame<'_> {
                     ("shadow_views", Bind::list(&table)),
                     ("shadow_map", Bind::Texture(shadow_map, 0)),
                 ],
-                draws: Vec::new(),
+                cover: Cover::Pixels,
             });
         }
         if layers.is_empty() {
@@ -139,7 +139,7 @@ impl Frame<'_> {
         }
         Ok(Some(plan.add(Raster {
             name: "frame.visibility",
-            about: format!("how much of {} light(s) each pixel sees", layers.len()),
+            about: format!("how much of {} each pixel sees", counted(layers.len(), "light")),
             shader: self.shaders.load("frame/visibility.wgsl", &[])?,
             size: self.view.sampled_size(),
             targets: vec![(Format::R16Float, crate::gpu::Blend::Replace)],
@@ -165,32 +165,35 @@ impl Frame<'_> {
         light: &Light,
         views: &LightViews,
     ) -> Result<Slot<Images>, Problem> {
-        let casters: Vec<&Item> = self.casters(place).collect();
+        // Planned once: an area light has up to 96 views of them.
+        let casters: Vec<(&Item, Draw)> = self
+            .casters(place)
+            .map(|item| {
+                let streams = vec![upload::stream(plan, item.mesh, Stream::Positions)];
+                (item, Draw { streams, indices: upload::stream(plan, item.mesh, Stream::Indices), instance: 0 })
+            })
+            .collect();
         let mut layers = Vec::new();
         for view in &views.views {
             let mut draws = Vec::new();
             let mut table = Vec::new();
-            for item in &casters {
+            for (item, draw) in &casters {
                 let clip_from_object = view.clip_from_world * DMat4::from(item.world_from_object);
                 if self.view.skip && is_outside(&item.corners, &view.clip_from_world) {
                     continue;
                 }
-                draws.push(Draw {
-                    streams: vec![shape::upload(plan, item.mesh, Stream::Positions)],
-                    indices: shape::upload(plan, item.mesh, Stream::Indices),
-                    instance: table.len() as u32,
-                });
+                draws.push(Draw { instance: table.len() as u32, ..draw.clone() });
                 table.push(tables::Caster { clip_from_object: clip_from_object.as_mat4() });
             }
             // An empty list cannot be bound; a view without casters draws nothing from a list of one.
             if table.is_empty() {
                 table.push(tables::Caster { clip_from_object: glam::Mat4::IDENTITY });
             }
-            layers.push(Layer { binds: vec![("casters", Bind::list(&table))], draws });
+            layers.push(Layer { binds: vec![("casters", Bind::list(&table))], cover: Cover::Meshes(draws) });
         }
         Ok(plan.add(Raster {
             name: "frame.shadow",
-            about: format!("depth from `{}`, {} view(s)", light.name, layers.len()),
+            about: format!("depth from `{}`, {}", light.name, counted(layers.len(), "view")),
             shader: self.shaders.load("frame/shadow.wgsl", &[])?,
             size: (views.size, views.size),
             targets: Vec::new(),

@@ -13,22 +13,24 @@
 //! | the rest | the camera or anything in the picture changes |
 
 mod compose;
+mod gloss;
 mod lights;
-mod shape;
 mod sky;
 mod surface;
 mod tables;
+mod upload;
 
 pub use surface::{Member, Surface};
 
 use crate::geometry::mesh::Mesh;
 use crate::gpu::{Bind, Blend, Buffer, Depth, Draw, Format, Images, Layer, Raster, Shaders};
 use crate::optics::fresnel::diffuse_transmittance;
-use crate::problem::Problem;
-use crate::scene::{Camera, LightKind, Material, Object, Scene, Substance, Varying};
+use crate::problem::{Problem, counted};
+use crate::scene::{Camera, LightKind, Material, Object, Scene, Substance, TextureMap, Varying, shape};
 use crate::store::{Plan, Slot};
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec3};
-use shape::Stream;
+use std::cell::OnceCell;
+use upload::Stream;
 
 /// Which of its three summands a picture shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -100,7 +102,9 @@ pub struct Frame<'a> {
     clip_from_eye: DMat4,
     camera: tables::Camera,
     /// The visibility of the lamps, once it was asked for: many views are costly to plan again.
-    visibility: std::cell::OnceCell<Option<Slot<Images>>>,
+    visibility: OnceCell<Option<Slot<Images>>>,
+    /// The table of everything that is drawn, once it was asked for: nearly every pass binds it.
+    objects: OnceCell<Bind>,
 }
 
 impl<'a> Frame<'a> {
@@ -151,7 +155,8 @@ impl<'a> Frame<'a> {
             items,
             clip_from_eye: DMat4::IDENTITY,
             camera: Frame::camera(view),
-            visibility: Default::default(),
+            visibility: OnceCell::new(),
+            objects: OnceCell::new(),
         };
         frame.clip_from_eye = frame.projection() * frame.rotation();
         frame.camera.clip_from_eye = frame.clip_from_eye.as_mat4();
@@ -234,6 +239,7 @@ impl<'a> Frame<'a> {
         let center = item.corners.iter().sum::<DVec3>() / 8.0;
         let radius = item.corners.iter().map(|p| p.distance(center)).fold(0.0, f64::max);
         item.entry = (entry_mm / self.scene.mm_per_unit).min(0.2 * radius);
+        self.objects = OnceCell::new();
     }
 
     pub(crate) fn material(&self, item: &Item) -> Option<&Material> {
@@ -253,11 +259,14 @@ impl<'a> Frame<'a> {
 
     /// The table of everything that is drawn, in the order of the items.
     pub(crate) fn objects_bind(&self) -> Bind {
-        let table: Vec<tables::Object> = self.items.iter().map(|item| self.row(item)).collect();
-        Bind::list(&table)
+        let table = || {
+            let maps = surface::maps(self);
+            Bind::list(&self.items.iter().map(|item| self.row(item, &maps)).collect::<Vec<tables::Object>>())
+        };
+        self.objects.get_or_init(table).clone()
     }
 
-    fn row(&self, item: &Item) -> tables::Object {
+    fn row(&self, item: &Item, maps: &[&TextureMap]) -> tables::Object {
         let eye_from_world = DAffine3::from_translation(-self.view.camera.eye);
         let mut row = tables::Object {
             eye_from_object: DMat4::from(eye_from_world * item.world_from_object).as_mat4(),
@@ -285,11 +294,11 @@ impl<'a> Frame<'a> {
                 row.scatter = scatter(material).as_vec3();
                 match &material.surface.color {
                     Varying::Constant(color) => row.color = color.as_vec3(),
-                    Varying::Texture(map) => row.color_layer = surface::texture_layer(self, map),
+                    Varying::Texture(map) => row.color_layer = surface::layer_of(maps, map),
                 }
                 match &material.surface.roughness {
                     Varying::Constant(roughness) => row.roughness = *roughness as f32,
-                    Varying::Texture(map) => row.roughness_layer = surface::texture_layer(self, map),
+                    Varying::Texture(map) => row.roughness_layer = surface::layer_of(maps, map),
                 }
                 if let Substance::Translucent(medium) = &material.medium {
                     row.flags = tables::TRANSLUCENT;
@@ -312,9 +321,9 @@ impl<'a> Frame<'a> {
             .enumerate()
             .filter(|(_, item)| item.in_view && wanted(item))
             .map(|(i, item)| {
-                let mut all = vec![shape::upload(plan, item.mesh, Stream::Positions)];
+                let mut all = vec![upload::stream(plan, item.mesh, Stream::Positions)];
                 all.extend(streams(plan, item));
-                Draw { streams: all, indices: shape::upload(plan, item.mesh, Stream::Indices), instance: i as u32 }
+                Draw { streams: all, indices: upload::stream(plan, item.mesh, Stream::Indices), instance: i as u32 }
             })
             .collect()
     }
@@ -333,9 +342,9 @@ impl<'a> Frame<'a> {
             plan,
             |_| true,
             |plan, item| {
-                let mut streams = vec![shape::upload(plan, item.mesh, Stream::Normals)];
+                let mut streams = vec![upload::stream(plan, item.mesh, Stream::Normals)];
                 if textures.is_some() {
-                    streams.push(shape::upload(plan, item.mesh, Stream::Uvs));
+                    streams.push(upload::stream(plan, item.mesh, Stream::Uvs));
                 }
                 streams
             },
@@ -343,12 +352,12 @@ impl<'a> Frame<'a> {
         let drawn = draws.len();
         Ok(plan.add(Raster {
             name: "frame.gbuffer",
-            about: format!("position, normal, colour and roughness of {drawn} things"),
+            about: format!("position, normal, colour and roughness of {}", counted(drawn, "thing")),
             shader: self.shaders.load("frame/gbuffer.wgsl", &flags)?,
             size: self.view.sampled_size(),
             targets: vec![(Format::Rgba32Float, Blend::Replace), (Format::Rgba32Uint, Blend::Replace)],
             depth: Depth::Write,
-            layers: vec![Layer { binds: Vec::new(), draws }],
+            layers: vec![Layer::meshes(draws)],
             array: false,
             binds,
         }))

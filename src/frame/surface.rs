@@ -1,10 +1,10 @@
 //! What a technique is given: its objects, and the maps of the frame, planned only when it asks for them.
 
-use super::{Frame, Item, PACKED, POSITION, shape};
+use super::{Frame, Item, PACKED, POSITION, upload};
 use crate::geometry::mesh::Mesh;
 use crate::gpu::{Bind, Buffer, Draw, Format, Gpu, Images, Shader, Shape};
 use crate::image::Texture;
-use crate::problem::Problem;
+use crate::problem::{Problem, counted};
 use crate::scene::{Material, TextureMap, Varying};
 use crate::store::{Key, Plan, Run, Slot, Step};
 use glam::Vec3;
@@ -103,21 +103,21 @@ impl<'a> Surface<'a> {
 
     /// The mesh's own normals, as a vertex stream.
     pub fn normals(&self, plan: &mut Plan, member: &Member) -> Slot<Buffer> {
-        shape::upload(plan, member.mesh, shape::Stream::Normals)
+        upload::stream(plan, member.mesh, upload::Stream::Normals)
     }
 
     /// A vector per vertex, as a vertex stream.
     pub fn upload(&self, plan: &mut Plan, vectors: Slot<Vec<Vec3>>) -> Slot<Buffer> {
-        shape::upload_vectors(plan, vectors)
+        upload::list(plan, vectors, "a vector per vertex")
     }
 
     /// The member, to be drawn with the given streams after its positions.
     pub fn draw(&self, plan: &mut Plan, member: &Member, streams: Vec<Slot<Buffer>>) -> Draw {
-        let mut all = vec![shape::upload(plan, member.mesh, shape::Stream::Positions)];
+        let mut all = vec![upload::stream(plan, member.mesh, upload::Stream::Positions)];
         all.extend(streams);
         Draw {
             streams: all,
-            indices: shape::upload(plan, member.mesh, shape::Stream::Indices),
+            indices: upload::stream(plan, member.mesh, upload::Stream::Indices),
             instance: member.place as u32,
         }
     }
@@ -128,7 +128,7 @@ impl<'a> Surface<'a> {
 }
 
 /// The textures of all materials in the picture, in the order in which objects name them.
-fn maps<'a>(frame: &'a Frame) -> Vec<&'a TextureMap> {
+pub(super) fn maps<'a>(frame: &'a Frame) -> Vec<&'a TextureMap> {
     let mut found: Vec<&TextureMap> = Vec::new();
     for material in frame.items.iter().filter(|item| item.in_view).filter_map(|item| frame.material(item)) {
         let surface = &material.surface;
@@ -144,8 +144,8 @@ fn maps<'a>(frame: &'a Frame) -> Vec<&'a TextureMap> {
 }
 
 /// A map's layer in the array of textures; -1 for one that no object in view names.
-pub(super) fn texture_layer(frame: &Frame, map: &TextureMap) -> i32 {
-    maps(frame).iter().position(|other| *other == map).map_or(-1, |layer| layer as i32)
+pub(super) fn layer_of(maps: &[&TextureMap], map: &TextureMap) -> i32 {
+    maps.iter().position(|other| *other == map).map_or(-1, |layer| layer as i32)
 }
 
 /// The array of textures; none when no material in view has any.
@@ -172,7 +172,7 @@ impl Step for Textures {
         "frame.textures"
     }
     fn about(&self) -> String {
-        format!("{} texture(s) to the device", self.maps.len())
+        format!("{} to the device", counted(self.maps.len(), "texture"))
     }
     fn run(&self, run: &Run) -> Result<Images, Problem> {
         let maps: Vec<_> = self.maps.iter().map(|slot| run.get(*slot)).collect();

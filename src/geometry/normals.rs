@@ -1,7 +1,7 @@
 //! Shading normals: the file's own, smooth, smooth up to a crease, or flat.
 //!
 //! A smooth normal is the sum of the normals of the faces around a position, each weighted by the angle it spans
-//! there, so that it does not depend on how a flat region is triangulated (Thürmer & Wüthrich 1998). Vertices at equal
+//! there, so that it does not depend on how a flat region is triangulated [Thurmer1998]. Vertices at equal
 //! positions share it: a uv seam does not show.
 
 use std::collections::HashMap;

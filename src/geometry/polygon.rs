@@ -1,4 +1,4 @@
-//! Polygons cut into triangles by clipping ears (Meisters 1975), so that concave ones come out right.
+//! Polygons cut into triangles by clipping ears [Meisters1975], so that concave ones come out right.
 
 use glam::{DVec2, DVec3};
 

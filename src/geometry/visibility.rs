@@ -1,6 +1,6 @@
 //! Which directions a point of a surface sees the environment in.
 //!
-//! Every point asks the same N directions, a spherical Fibonacci lattice (Keinert et al. 2015): equal weights 4 pi / N integrate
+//! Every point asks the same N directions, a spherical Fibonacci lattice [Keinert2015]: equal weights 4 pi / N integrate
 //! smooth functions over the sphere as well as any other set of that size, and a bit per direction is all that is kept.
 //! With N = 256 the cosine over a hemisphere comes out as pi within 0.5 % for any normal.
 

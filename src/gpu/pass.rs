@@ -38,15 +38,28 @@ pub struct Draw {
     pub instance: u32,
 }
 
-/// One layer of a raster pass, with what differs between layers. Without meshes to draw, a shader that includes
-/// `lib/fullscreen.wgsl` runs for every pixel of the layer.
+/// What a layer's fragments come from.
+#[derive(Clone, Serialize)]
+pub enum Cover {
+    /// Every pixel: the shader includes `lib/fullscreen.wgsl`.
+    Pixels,
+    Meshes(Vec<Draw>),
+}
+
+/// One layer of a raster pass, with what differs between layers.
 #[derive(Clone, Serialize)]
 pub struct Layer {
     pub binds: Vec<(&'static str, Bind)>,
-    pub draws: Vec<Draw>,
+    pub cover: Cover,
 }
 
-/// Draws meshes. Makes its colour targets in their order, then the depth map if it writes one.
+impl Layer {
+    pub fn meshes(draws: Vec<Draw>) -> Layer {
+        Layer { binds: Vec::new(), cover: Cover::Meshes(draws) }
+    }
+}
+
+/// Draws meshes, or every pixel of several layers. Makes its colour targets in their order, then the depth map if it writes one.
 #[derive(Serialize)]
 pub struct Raster {
     pub name: &'static str,
@@ -101,70 +114,7 @@ impl Step for Raster {
         self.about.clone()
     }
     fn run(&self, run: &Run) -> Result<Images, Problem> {
-        let gpu: &Gpu = run.host();
-        let shape = |format| Shape {
-            width: self.size.0,
-            height: self.size.1,
-            layers: self.layers.len() as u32,
-            array: self.array,
-            format,
-        };
-        let mut images: Vec<Texture> = self.targets.iter().map(|(format, _)| gpu.texture(shape(*format))).collect();
-        if matches!(self.depth, Depth::Write) {
-            images.push(gpu.texture(shape(Format::Depth32Float)));
-        }
-        let tested = match &self.depth {
-            Depth::Equal(slot, i) => Some((run.get(*slot), *i)),
-            _ => None,
-        };
-        let entries: &[&str] = if self.targets.is_empty() { &["vertex"] } else { &["vertex", "fragment"] };
-        let wanted = bind::wanted(&self.shader, entries);
-        let stopwatch = gpu.stopwatch();
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        for (i, layer) in self.layers.iter().enumerate() {
-            let mut binds = layer.binds.clone();
-            binds.extend(self.binds.iter().cloned());
-            let ready = bind::pair(gpu, run, &self.shader, &wanted, &binds, None)?;
-            let bind_entries = bind::entries(&wanted, &ready);
-            let Pipeline::Render(pipeline, bind_layout) =
-                render_pipeline(gpu, self.name, &self.shader, &bind_entries, &self.targets, &self.depth)
-            else {
-                unreachable!("a raster pass has a render pipeline")
-            };
-            let group = bind::group(&gpu.device, &bind_layout, &wanted, &ready);
-            let views: Vec<_> = images.iter().map(|image| image.layer(i as u32)).collect();
-            let (colours, depth) = views.split_at(self.targets.len());
-            let attachments: Vec<_> = colours.iter().map(colour_attachment).collect();
-            let depth_view = depth.first().or(tested.as_ref().map(|(images, i)| &images.0[*i].view));
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some(self.name),
-                color_attachments: &attachments,
-                depth_stencil_attachment: depth_view.map(|view| wgpu::RenderPassDepthStencilAttachment {
-                    view,
-                    depth_ops: tested
-                        .is_none()
-                        .then_some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
-                    stencil_ops: None,
-                }),
-                timestamp_writes: timestamps(&stopwatch, i == 0, i + 1 == self.layers.len()),
-                ..Default::default()
-            });
-            pass.set_pipeline(&pipeline);
-            pass.set_bind_group(0, &group, &[]);
-            if self.shader.is_fullscreen() {
-                pass.draw(0..3, 0..1);
-            }
-            for draw in &layer.draws {
-                for (location, stream) in draw.streams.iter().enumerate() {
-                    pass.set_vertex_buffer(location as u32, run.get(*stream).buffer.slice(..));
-                }
-                let indices = run.get(draw.indices);
-                pass.set_index_buffer(indices.buffer.slice(..), wgpu::IndexFormat::Uint32);
-                pass.draw_indexed(0..(indices.bytes / 4) as u32, 0, draw.instance..draw.instance + 1);
-            }
-        }
-        gpu.submit(run, self.name, encoder, stopwatch)?;
-        Ok(Images(images))
+        draw(run, self)
     }
 }
 
@@ -177,35 +127,18 @@ impl Step for Fullscreen {
         self.about.clone()
     }
     fn run(&self, run: &Run) -> Result<Images, Problem> {
-        let gpu: &Gpu = run.host();
-        let images: Vec<Texture> =
-            self.targets.iter().map(|format| gpu.texture(Shape::flat(self.size, *format))).collect();
-        let wanted = bind::wanted(&self.shader, &["vertex", "fragment"]);
-        let ready = bind::pair(gpu, run, &self.shader, &wanted, &self.binds, None)?;
-        let targets: Vec<_> = self.targets.iter().map(|format| (*format, Blend::Replace)).collect();
-        let entries = bind::entries(&wanted, &ready);
-        let Pipeline::Render(pipeline, layout) =
-            render_pipeline(gpu, self.name, &self.shader, &entries, &targets, &Depth::Off)
-        else {
-            unreachable!("a fullscreen pass has a render pipeline")
+        let raster = Raster {
+            name: self.name,
+            about: String::new(),
+            shader: self.shader.clone(),
+            size: self.size,
+            targets: self.targets.iter().map(|format| (*format, Blend::Replace)).collect(),
+            depth: Depth::Off,
+            layers: vec![Layer { binds: Vec::new(), cover: Cover::Pixels }],
+            array: false,
+            binds: self.binds.clone(),
         };
-        let group = bind::group(&gpu.device, &layout, &wanted, &ready);
-        let stopwatch = gpu.stopwatch();
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        {
-            let attachments: Vec<_> = images.iter().map(|image| colour_attachment(&image.view)).collect();
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some(self.name),
-                color_attachments: &attachments,
-                timestamp_writes: timestamps(&stopwatch, true, true),
-                ..Default::default()
-            });
-            pass.set_pipeline(&pipeline);
-            pass.set_bind_group(0, &group, &[]);
-            pass.draw(0..3, 0..1);
-        }
-        gpu.submit(run, self.name, encoder, stopwatch)?;
-        Ok(Images(images))
+        draw(run, &raster)
     }
 }
 
@@ -241,6 +174,77 @@ impl Step for Compute {
         drop::<Vec<Ready>>(ready);
         Ok(Arc::into_inner(output).expect("nothing holds the output any more"))
     }
+}
+
+fn draw(run: &Run, raster: &Raster) -> Result<Images, Problem> {
+    let gpu: &Gpu = run.host();
+    let shape = |format| Shape {
+        width: raster.size.0,
+        height: raster.size.1,
+        layers: raster.layers.len() as u32,
+        array: raster.array,
+        format,
+    };
+    let mut images: Vec<Texture> = raster.targets.iter().map(|(format, _)| gpu.texture(shape(*format))).collect();
+    if matches!(raster.depth, Depth::Write) {
+        images.push(gpu.texture(shape(Format::Depth32Float)));
+    }
+    let tested = match &raster.depth {
+        Depth::Equal(slot, i) => Some((run.get(*slot), *i)),
+        _ => None,
+    };
+    let entries: &[&str] = if raster.targets.is_empty() { &["vertex"] } else { &["vertex", "fragment"] };
+    let wanted = bind::wanted(&raster.shader, entries);
+    let stopwatch = gpu.stopwatch();
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    for (i, layer) in raster.layers.iter().enumerate() {
+        let mut binds = layer.binds.clone();
+        binds.extend(raster.binds.iter().cloned());
+        let ready = bind::pair(gpu, run, &raster.shader, &wanted, &binds, None)?;
+        let bind_entries = bind::entries(&wanted, &ready);
+        let Pipeline::Render(pipeline, bind_layout) =
+            render_pipeline(gpu, raster.name, &raster.shader, &bind_entries, &raster.targets, &raster.depth)
+        else {
+            unreachable!("a raster pass has a render pipeline")
+        };
+        let group = bind::group(&gpu.device, &bind_layout, &wanted, &ready);
+        let views: Vec<_> = images.iter().map(|image| image.layer(i as u32)).collect();
+        let (colours, depth) = views.split_at(raster.targets.len());
+        let attachments: Vec<_> = colours.iter().map(colour_attachment).collect();
+        let depth_view = depth.first().or(tested.as_ref().map(|(images, i)| &images.0[*i].view));
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some(raster.name),
+            color_attachments: &attachments,
+            depth_stencil_attachment: depth_view.map(|view| wgpu::RenderPassDepthStencilAttachment {
+                view,
+                depth_ops: tested
+                    .is_none()
+                    .then_some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
+                stencil_ops: None,
+            }),
+            timestamp_writes: timestamps(&stopwatch, i == 0, i + 1 == raster.layers.len()),
+            ..Default::default()
+        });
+        pass.set_pipeline(&pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        let draws = match &layer.cover {
+            Cover::Pixels => {
+                pass.draw(0..3, 0..1);
+                continue;
+            }
+            Cover::Meshes(draws) => draws,
+        };
+        for draw in draws {
+            for (location, stream) in draw.streams.iter().enumerate() {
+                pass.set_vertex_buffer(location as u32, run.get(*stream).buffer.slice(..));
+            }
+            let indices = run.get(draw.indices);
+            pass.set_index_buffer(indices.buffer.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed(0..(indices.bytes / 4) as u32, 0, draw.instance..draw.instance + 1);
+        }
+    }
+    gpu.submit(run, raster.name, encoder, stopwatch)?;
+    Ok(Images(images))
 }
 
 /// How many workgroups `lib/element.wgsl` expects side by side.

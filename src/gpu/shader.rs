@@ -6,8 +6,8 @@
 //! a scene does not need is absent, not switched off. One file is one pass: its entry points are called `vertex`,
 //! `fragment` and `compute`.
 //!
-//! The program carries its shaders with it; a shader folder on disk replaces them, and is read anew for every plan, so
-//! that an edit shows at once.
+//! The program carries its shaders with it; a shader folder on disk replaces them. Each file is read once, until
+//! [`Shaders::look_again`]: whoever looks at the scene's files anew looks at these too.
 
 use crate::problem::{At, Problem};
 use crate::store::{Files, Key};
@@ -57,24 +57,25 @@ impl std::fmt::Debug for Shader {
     }
 }
 
-impl Checked {
-    /// Whether the vertex shader reads no vertices but makes its own triangle.
-    pub(super) fn is_fullscreen(&self) -> bool {
-        self.text.contains("@builtin(vertex_index)")
-    }
-}
-
 /// All shaders, from a folder or from the program itself. What was checked once is not checked again.
 pub struct Shaders {
     folder: Option<PathBuf>,
     files: Arc<Files>,
-    checked: Mutex<HashMap<Key, Result<Shader, Problem>>>,
+    known: Mutex<Known>,
+}
+
+#[derive(Default)]
+struct Known {
+    /// By the name of the joined text: for good.
+    checked: HashMap<Key, Result<Shader, Problem>>,
+    /// By file and flags: as the files were when they were last looked at. A plan asks for the same few over and over.
+    loaded: HashMap<String, Vec<(Vec<String>, Result<Shader, Problem>)>>,
 }
 
 impl Shaders {
     /// Shaders from `folder`, or those that the program carries.
     pub fn new(folder: Option<PathBuf>, files: Arc<Files>) -> Shaders {
-        Shaders { folder, files, checked: Mutex::default() }
+        Shaders { folder, files, known: Mutex::default() }
     }
 
     /// The shader folder that an artist would expect to be read: the one that the environment names, the one here, the
@@ -97,18 +98,41 @@ impl Shaders {
         EMBEDDED.iter().map(|(name, _)| *name)
     }
 
+    /// Forgets what the files held, so that each is read anew when it is next asked for.
+    pub fn look_again(&self) {
+        self.known().loaded.clear();
+    }
+
     /// The shader `name` (`frame/gbuffer.wgsl`) with all that it includes, and the lines that `flags` ask for.
     pub fn load(&self, name: &str, flags: &[&str]) -> Result<Shader, Problem> {
+        let loaded = |known: &Known| {
+            let of_name = known.loaded.get(name)?;
+            of_name.iter().find(|(with, _)| with == flags).map(|(_, shader)| shader.clone())
+        };
+        if let Some(loaded) = loaded(&self.known()) {
+            return loaded;
+        }
+        let shader = self.read(name, flags);
+        let flags = flags.iter().map(|flag| flag.to_string()).collect();
+        self.known().loaded.entry(name.to_string()).or_default().push((flags, shader.clone()));
+        shader
+    }
+
+    fn read(&self, name: &str, flags: &[&str]) -> Result<Shader, Problem> {
         let mut joined = Joined { flags, text: String::new(), lines: Vec::new(), seen: BTreeSet::new() };
         self.join(name, None, &mut joined)?;
         let Joined { text, lines, .. } = joined;
         let key = Key::of(&(name, &text));
-        if let Some(known) = self.checked.lock().expect("no panic while checking").get(&key) {
-            return known.clone();
+        if let Some(checked) = self.known().checked.get(&key) {
+            return checked.clone();
         }
         let checked = check(name, key, text, &lines);
-        self.checked.lock().expect("no panic while checking").insert(key, checked.clone());
+        self.known().checked.insert(key, checked.clone());
         checked
+    }
+
+    fn known(&self) -> std::sync::MutexGuard<'_, Known> {
+        self.known.lock().expect("nobody panics while noting a shader")
     }
 
     fn source(&self, name: &str) -> Result<(PathBuf, String), String> {

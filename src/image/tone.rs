@@ -14,7 +14,7 @@ pub enum Tone {
     #[default]
     Srgb,
     /// A toe and a shoulder, then the sRGB transfer function: highlights roll off to white instead of being cut, and hue
-    /// is kept. The curve is the Khronos PBR Neutral tone mapper (Khronos Group, 2024).
+    /// is kept. The curve is the Khronos PBR Neutral tone mapper [Khronos2024].
     Filmic,
 }
 

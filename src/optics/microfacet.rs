@@ -65,7 +65,7 @@ pub fn directional_albedo_table(eta: f64, width: usize, height: usize) -> Vec<f6
 }
 
 /// Integrates over the normals that the eye sees: the visible half of the hemisphere, stretched by alpha, is a cap of
-/// the unit sphere around which mirror directions are uniform (Dupuy & Benyoub 2023). What is left under the integral,
+/// the unit sphere around which mirror directions are uniform [Dupuy2023]. What is left under the integral,
 /// F G2/G1, is smooth at any roughness.
 fn lobe_albedo(cos: f64, roughness: f64, fresnel: impl Fn(f64) -> f64) -> f64 {
     let alpha = roughness * roughness;

@@ -49,7 +49,7 @@ pub fn isotropic() -> f64 {
     0.25 / PI
 }
 
-/// Henyey and Greenstein's function for the mean cosine `g` in (-1, 1).
+/// Henyey and Greenstein's function [Henyey1941] for the mean cosine `g` in (-1, 1).
 pub fn henyey_greenstein(cos: f64, g: f64) -> f64 {
     let q = 1.0 + g * g + 2.0 * g * cos;
     0.25 / PI * (1.0 - g * g) / (q * q.sqrt())

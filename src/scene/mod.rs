@@ -20,6 +20,7 @@ mod path;
 mod reader;
 mod scalar;
 mod scene_file;
+pub mod shape;
 mod technique;
 mod tree;
 mod warn;
@@ -93,7 +94,8 @@ pub enum LightKind {
     Point { position: DVec3, intensity: DVec3 },
     /// `u` and `v` are half-edges; emits to the side of cross(u, v); reflects nothing, blocks light.
     Rect { center: DVec3, u: DVec3, v: DVec3, radiance: DVec3 },
-    /// From everywhere, turned about y.
+    /// From everywhere. An image's centre lies at -z and its right half towards +x, before it is turned about y, the way
+    /// an object turns: by 90 degrees from -z to -x.
     Environment { sky: Sky, scale: f64, rotation_deg: f64 },
 }
 

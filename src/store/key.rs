@@ -86,10 +86,11 @@ impl Serialize for SlotBytes {
     }
 }
 
-/// Spells values into a hash, and collects the slots that it meets on the way.
+/// Spells values, and collects the slots that it meets on the way. What is named is small (parameters, and names of what is
+/// large), so it is spelled out first and hashed in one go, which is much faster than piece by piece.
 #[derive(Default)]
 pub(super) struct Spelling {
-    hash: blake3::Hasher,
+    spelled: Vec<u8>,
     slots: Vec<u32>,
     in_slot: bool,
 }
@@ -102,18 +103,18 @@ impl Spelling {
 
     /// The name, and the places of the slots that the value holds, in the order of its fields.
     pub fn finish(self) -> (Key, Vec<u32>) {
-        (Key(*self.hash.finalize().as_bytes()), self.slots)
+        (Key::of_bytes(&self.spelled), self.slots)
     }
 
     fn tag(&mut self, tag: u8, bytes: &[u8]) -> Result<(), Unspellable> {
-        self.hash.update(&[tag]);
-        self.hash.update(bytes);
+        self.spelled.push(tag);
+        self.spelled.extend_from_slice(bytes);
         Ok(())
     }
 
     fn text(&mut self, tag: u8, text: &str) -> Result<(), Unspellable> {
         self.tag(tag, &(text.len() as u64).to_le_bytes())?;
-        self.hash.update(text.as_bytes());
+        self.spelled.extend_from_slice(text.as_bytes());
         Ok(())
     }
 
@@ -179,7 +180,7 @@ impl Serializer for &mut Spelling {
             return self.tag(14, &v[4..]);
         }
         self.length(15, Some(v.len()))?;
-        self.hash.update(v);
+        self.spelled.extend_from_slice(v);
         Ok(())
     }
     fn serialize_none(self) -> Result<(), Unspellable> {

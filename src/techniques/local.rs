@@ -2,7 +2,7 @@
 
 use crate::frame::{Member, Surface};
 use crate::gpu::{Bind, Blend, Buffer, Format, Layer, Raster};
-use crate::problem::Problem;
+use crate::problem::{Problem, counted};
 use crate::store::{Plan, Slot};
 
 use super::Scattered;
@@ -40,12 +40,12 @@ pub(super) fn scatter(
     }
     Ok(plan.add(Raster {
         name: "technique.local",
-        about: format!("light that {} thing(s) scatter where it entered", draws.len()),
+        about: format!("light that {} scattered where it entered", counted(draws.len(), "thing")),
         shader: surface.shader("techniques/local.wgsl", &flags)?,
         size: surface.size(),
         targets: vec![(Format::Rgba32Float, Blend::Replace)],
         depth: surface.depth(),
-        layers: vec![Layer { binds: Vec::new(), draws }],
+        layers: vec![Layer::meshes(draws)],
         array: false,
         binds,
     }))

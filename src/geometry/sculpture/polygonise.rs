@@ -1,4 +1,4 @@
-//! The zero set of a field as triangles: marching tetrahedra (Doi & Koide 1991).
+//! The zero set of a field as triangles: marching tetrahedra [Doi1991].
 //!
 //! Each cell of a cubic lattice is parted into the six tetrahedra along its diagonal, which fit those of its neighbours.
 //! A linear function on a tetrahedron has one sheet at most, so the result is closed and manifold whatever the field.

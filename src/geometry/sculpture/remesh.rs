@@ -1,4 +1,4 @@
-//! Even triangles: incremental isotropic remeshing (Botsch & Kobbelt 2004) of a closed surface that lies on a field's
+//! Even triangles: incremental isotropic remeshing [Botsch2004] of a closed surface that lies on a field's
 //! zero set. Short edges are collapsed, edges flipped until the triangles are Delaunay, and vertices drawn to the middle
 //! of their neighbours along the surface and projected back onto it.
 //!

@@ -1,16 +1,15 @@
-//! From a scene's shapes to vertices on the device.
+//! From an object's shape to its mesh: the steps that whoever draws or traces the scene shares.
 //!
 //! Re-runs when: a shape's parameters, its normals, its scale, or (for what deforms) the time change. Moving and turning an
 //! object re-runs nothing here.
 
+use super::{Deform, Figure, MeshSource, Normals, Object};
 use crate::geometry::deform::Twist;
 use crate::geometry::mesh::{Bounds, Mesh};
 use crate::geometry::{normals, sculpture, shapes};
-use crate::gpu::{Buffer, Gpu};
 use crate::problem::Problem;
-use crate::scene::{self, Deform, MeshSource, Normals, Object};
 use crate::store::{Bake, Plan, Run, Slot, Step};
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DAffine3, DVec3};
 use serde::Serialize;
 
 /// A shape that the program makes itself.
@@ -38,8 +37,8 @@ impl Step for Shape {
             MeshSource::Slab { size, segments } => shapes::slab(*size, *segments),
             MeshSource::Sculpture { figure, height, detail } => {
                 let figure = match figure {
-                    scene::Figure::Hare => sculpture::Figure::Hare,
-                    scene::Figure::Bust => sculpture::Figure::Bust,
+                    Figure::Hare => sculpture::Figure::Hare,
+                    Figure::Bust => sculpture::Figure::Bust,
                 };
                 run.tick(0.0)?;
                 sculpture::sculpture(figure, *height, *detail)
@@ -50,7 +49,7 @@ impl Step for Shape {
 }
 
 impl Bake for Shape {
-    const CODE: &'static [&'static str] = &["src/geometry/", "src/frame/shape.rs"];
+    const CODE: &'static [&'static str] = &["src/geometry/", "src/scene/shape.rs"];
 }
 
 fn describe(shape: &MeshSource) -> String {
@@ -116,7 +115,7 @@ impl Step for Worn {
 }
 
 /// Adds the steps that make an object's mesh, in its own space but for its scale: scene units.
-pub(super) fn mesh(plan: &mut Plan, object: &Object, time_s: f64) -> Slot<Mesh> {
+pub fn mesh(plan: &mut Plan, object: &Object, time_s: f64) -> Slot<Mesh> {
     let mesh = match &object.mesh {
         MeshSource::File { key, mesh, .. } => plan.given("geometry.file", describe(&object.mesh), *key, mesh.clone()),
         shape => plan.bake(Shape { shape: shape.clone() }),
@@ -132,7 +131,7 @@ pub(super) fn mesh(plan: &mut Plan, object: &Object, time_s: f64) -> Slot<Mesh> 
 }
 
 /// Where an object's mesh certainly lies, before it is made: object space, scaled.
-pub(super) fn bounds(object: &Object) -> (DVec3, DVec3) {
+pub fn bounds(object: &Object) -> (DVec3, DVec3) {
     let (mut min, mut max) = match &object.mesh {
         MeshSource::File { mesh, .. } => {
             let Bounds { min, max } = mesh.bounds();
@@ -167,7 +166,8 @@ fn around(radius: f64) -> (DVec3, DVec3) {
     (DVec3::splat(-radius), DVec3::splat(radius))
 }
 
-pub(super) fn corners(min: DVec3, max: DVec3) -> [DVec3; 8] {
+/// The corners of a box.
+pub fn corners(min: DVec3, max: DVec3) -> [DVec3; 8] {
     std::array::from_fn(|i| {
         DVec3::new(
             if i & 1 == 0 { min.x } else { max.x },
@@ -177,72 +177,8 @@ pub(super) fn corners(min: DVec3, max: DVec3) -> [DVec3; 8] {
     })
 }
 
-/// One stream of a mesh, on the device.
-#[derive(Serialize)]
-struct Upload {
-    mesh: Slot<Mesh>,
-    stream: Stream,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub(super) enum Stream {
-    Positions,
-    Normals,
-    Uvs,
-    Indices,
-}
-
-impl Step for Upload {
-    type Output = Buffer;
-    fn name(&self) -> &'static str {
-        "gpu.upload"
-    }
-    fn about(&self) -> String {
-        format!("{:?} to the device", self.stream).to_lowercase()
-    }
-    fn run(&self, run: &Run) -> Result<Buffer, Problem> {
-        let mesh = run.get(self.mesh);
-        let gpu: &Gpu = run.host();
-        Ok(match self.stream {
-            Stream::Positions => Buffer::new(gpu, bytemuck::cast_slice(&mesh.positions)),
-            Stream::Normals => Buffer::new(gpu, bytemuck::cast_slice(&mesh.normals)),
-            // A mesh without texture coordinates shows one texel.
-            Stream::Uvs if mesh.uvs.is_empty() => Buffer::new(gpu, &vec![0; 8 * mesh.positions.len()]),
-            Stream::Uvs => Buffer::new(gpu, bytemuck::cast_slice(&mesh.uvs)),
-            Stream::Indices => Buffer::new(gpu, bytemuck::cast_slice(&mesh.triangles)),
-        })
-    }
-}
-
-pub(super) fn upload(plan: &mut Plan, mesh: Slot<Mesh>, stream: Stream) -> Slot<Buffer> {
-    plan.add(Upload { mesh, stream })
-}
-
-/// One vector per vertex, on the device.
-#[derive(Serialize)]
-struct UploadVectors {
-    vectors: Slot<Vec<Vec3>>,
-}
-
-impl Step for UploadVectors {
-    type Output = Buffer;
-    fn name(&self) -> &'static str {
-        "gpu.upload"
-    }
-    fn about(&self) -> String {
-        "a vector per vertex to the device".into()
-    }
-    fn run(&self, run: &Run) -> Result<Buffer, Problem> {
-        Ok(Buffer::new(run.host::<Gpu>(), bytemuck::cast_slice(run.get(self.vectors).as_slice())))
-    }
-}
-
-pub(super) fn upload_vectors(plan: &mut Plan, vectors: Slot<Vec<Vec3>>) -> Slot<Buffer> {
-    plan.add(UploadVectors { vectors })
-}
-
 /// The quad of an area light.
-pub(super) fn quad(plan: &mut Plan, name: &str, u: DVec3, v: DVec3) -> Slot<Mesh> {
+pub fn quad(plan: &mut Plan, name: &str, u: DVec3, v: DVec3) -> Slot<Mesh> {
     plan.add(Quad { name: name.to_string(), u, v })
 }
 
