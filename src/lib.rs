@@ -71,6 +71,7 @@ pub mod image;
 pub mod optics;
 pub mod papers;
 pub mod problem;
+pub mod reference;
 pub mod render;
 pub mod scene;
 pub mod session;

@@ -63,4 +63,9 @@ pub const PAPERS: &[Paper] = &[
         "A. Tomaszewska & K. Stefanowski. Real-Time Spherical Harmonics Based Subsurface Scattering. ICIAR 2012",
     ),
     paper("Walter2007", "B. Walter et al. Microfacet Models for Refraction through Rough Surfaces. EGSR 2007"),
+    paper(
+        "Walter2009",
+        "B. Walter, S. Zhao, N. Holzschuch & K. Bala. Single Scattering in Refractive Media with Triangle Mesh Boundaries. SIGGRAPH 2009",
+    ),
+    paper("Wilkie2014", "A. Wilkie et al. Hero Wavelength Spectral Sampling. EGSR 2014"),
 ];

@@ -3,11 +3,13 @@
 use crate::gpu::{Gpu, Shaders};
 use crate::image::Image;
 use crate::problem::{Cause, Problem, Problems, counted};
+use crate::reference::{self, film::Film};
 use crate::render::{self, Look};
-use crate::scene::{Reader, Scene};
+use crate::scene::{Part, Reader, Scene};
 use crate::store::{Disk, Files, Plan, Slot, Store, Watch};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Instant;
 
 /// Where bakes are kept and what passes run on.
 #[derive(Clone, Debug, Default)]
@@ -31,6 +33,17 @@ impl Options {
             },
         }
     }
+}
+
+/// When a reference is good enough.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Goal {
+    /// So many samples per pixel.
+    Samples(u64),
+    /// The relative standard error of a part, or else so many samples.
+    Error { part: Part, at_most: f64, max_samples: u64 },
+    /// So many seconds: the last doubling of the samples that can be finished in them.
+    Seconds(f64),
 }
 
 pub struct Session {
@@ -108,6 +121,43 @@ impl Session {
         );
         let hint = format!("at most {} pixels a side, or fewer samples: --set view.antialias=1", largest / samples);
         Err(Problem::new(cause, what).hint(hint))
+    }
+
+    /// The truth by paths on the CPU, as far as `goal` asks. `each` is told of every doubling of the samples.
+    pub fn trace(
+        &mut self,
+        scene: &Scene,
+        settings: &reference::Settings,
+        goal: &Goal,
+        watch: &dyn Watch,
+        mut each: impl FnMut(&Film),
+    ) -> Result<Arc<Film>, Problem> {
+        let started = Instant::now();
+        let mut samples = 1;
+        loop {
+            let mut plan = Plan::default();
+            let slot = reference::plan(&mut plan, scene, settings, samples);
+            let before = started.elapsed();
+            let film = self.store.get_with(&plan, slot, None, watch)?;
+            each(&film);
+            let time = started.elapsed();
+            let enough = match *goal {
+                Goal::Samples(count) => samples >= count,
+                Goal::Error { part, at_most, max_samples } => {
+                    samples >= max_samples || samples > 1 && film.relative_standard_error(part) <= at_most
+                }
+                // The next doubling takes twice as long as the last: it is begun only if it can be finished.
+                Goal::Seconds(seconds) => (time + 2 * (time - before)).as_secs_f64() > seconds,
+            };
+            if enough {
+                return Ok(film);
+            }
+            samples = match *goal {
+                Goal::Samples(count) => (2 * samples).min(count),
+                Goal::Error { max_samples, .. } => (2 * samples).min(max_samples),
+                Goal::Seconds(_) => 2 * samples,
+            };
+        }
     }
 
     /// One value of a plan that needs the device.

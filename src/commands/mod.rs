@@ -10,10 +10,11 @@ mod look;
 mod media;
 mod new;
 mod progress;
+mod reference;
 mod render;
 mod techniques;
 
-use crate::problem::{Cause, Problem, Problems};
+use crate::problem::{Cause, Problem, Problems, counted};
 use crate::session::{Options, Session};
 use clap::{Parser, Subcommand};
 use serde_json::{Value, json};
@@ -57,6 +58,7 @@ enum Command {
     Render(render::Render),
     Check(check::Check),
     Explain(explain::Explain),
+    Reference(Box<reference::Reference>),
     Techniques(techniques::Techniques),
     Bake(bake::Bake),
     #[command(subcommand)]
@@ -188,6 +190,7 @@ impl Words {
             Some(Command::Explain(command)) => return command.run(options),
             Some(Command::Render(command)) => command.run(options, &line)?,
             Some(Command::Bake(command)) => command.run(options)?,
+            Some(Command::Reference(command)) => command.run(options)?,
             Some(Command::Media(command)) => command.run(options)?,
             Some(Command::Techniques(command)) => command.run()?,
             Some(Command::Cache(command)) => command.run(options)?,
@@ -232,9 +235,4 @@ fn session(options: Options) -> Session {
     // A second handler cannot be set; the first serves.
     ctrlc::set_handler(interrupted).ok();
     session
-}
-
-/// `1 bake`, `2 bakes`
-fn counted(count: usize, thing: &str) -> String {
-    format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }

@@ -26,6 +26,13 @@ impl Progress {
         }
     }
 
+    /// A line on the terminal, if there is one.
+    pub fn tell(&self, line: &str) {
+        if self.shown {
+            eprintln!("{line}");
+        }
+    }
+
     /// All that happened since this was last asked.
     pub fn take(&self) -> (Vec<Finished>, Vec<Problem>) {
         let finished = std::mem::take(&mut *self.finished.lock().expect("no panic while noting a step"));

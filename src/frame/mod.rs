@@ -20,6 +20,7 @@ mod surface;
 mod tables;
 mod upload;
 
+pub use crate::scene::Part;
 pub use surface::{Member, Surface};
 
 use crate::geometry::mesh::Mesh;
@@ -31,25 +32,6 @@ use crate::store::{Plan, Slot};
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec3};
 use std::cell::OnceCell;
 use upload::Stream;
-
-/// Which of its three summands a picture shows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Part {
-    #[default]
-    Full,
-    /// Entered, scattered at least once, left.
-    Scattered,
-    /// Reflected at the boundary.
-    Glossy,
-    /// Passed through without scattering; what is seen of the surroundings and of lights.
-    Unscattered,
-}
-
-impl Part {
-    pub fn has(self, part: Part) -> bool {
-        self == Part::Full || self == part
-    }
-}
 
 /// How to look at a scene, as far as the frame is concerned.
 #[derive(Clone, Debug, PartialEq)]

@@ -108,17 +108,32 @@ impl Bvh {
 
     /// The nearest triangle between `t_min` and `t_max` (scene units) along the unit vector `direction`, from either side.
     pub fn closest_hit(&self, origin: DVec3, direction: DVec3, t_min: f64, t_max: f64) -> Option<Hit> {
-        let mut local = self.local(origin, direction, t_min, t_max);
+        self.closest(self.local(origin, direction, t_min, t_max), |_| false)
+    }
+
+    /// The nearest triangle up to `t_max` (scene units), but for the object's triangle on which the ray starts: a plane is
+    /// met only once, so a ray needs no offset to leave it.
+    pub fn closest_hit_but(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        t_max: f64,
+        start: Option<(u32, u32)>,
+    ) -> Option<Hit> {
+        self.closest(self.local(origin, direction, 0.0, t_max), |source| start == Some(source))
+    }
+
+    fn closest(&self, mut local: Local, is_left_out: impl Fn((u32, u32)) -> bool) -> Option<Hit> {
         let mut best = None;
         let mut found = RayHit::none();
         self.tree.ray_traverse(local.ray(), &mut found, |_, i| match local.intersect(&self.corners[i]) {
-            Some((t, barycentrics)) => {
+            Some((t, barycentrics)) if !is_left_out(self.source[i]) => {
                 local.t_max = t;
                 let (object, triangle) = self.source[i];
                 best = Some(Hit { t: (t + local.moved) * self.scale, object, triangle, barycentrics });
                 t as f32
             }
-            None => f32::INFINITY,
+            _ => f32::INFINITY,
         });
         debug_assert!(best.is_some() || found.primitive_id == INVALID_ID);
         best

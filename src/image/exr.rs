@@ -76,6 +76,15 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Texture, Refused> {
     Ok(Texture { width: width as u32, height: height as u32, texels: file.layer_data.channel_data.pixels.1 })
 }
 
+/// The lines of the standard attribute `comments`: pairs of key and value, as [`encode`] writes them.
+pub(super) fn text(bytes: &[u8]) -> Result<Vec<(String, String)>, Refused> {
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(refused)?;
+    let comments = meta.headers.first().and_then(|header| header.own_attributes.comments.clone());
+    let comments = comments.map(|text| text.to_string()).unwrap_or_default();
+    let pair = |line: &str| line.split_once(": ").map(|(key, value)| (key.to_string(), value.to_string()));
+    Ok(comments.lines().filter_map(pair).collect())
+}
+
 fn refused(error: Error) -> Refused {
     match error {
         Error::NotSupported(what) => Refused::new(

@@ -25,7 +25,7 @@ use crate::problem::{At, Problem};
 
 pub use read::{MAX_BYTES, MAX_SIDE, decode};
 pub use tone::Tone;
-pub use write::{Display, Format, png_text, write_file};
+pub use write::{Display, Format, exr_text, png_text, write_file};
 
 /// Linear Rec.709 radiance. `pixels[y * width + x]`, with y counted from the top.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

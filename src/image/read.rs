@@ -31,7 +31,7 @@ pub fn decode(bytes: &[u8], file: &Path, encoding: Encoding) -> Result<Texture, 
         Ok(Err(refused)) => refused,
         Err(_) => Refused::damaged(&"its reader gave up"),
     };
-    Err(Problem::files(refused.what).at(At::file(file)).hint(refused.hint))
+    Err(refused.problem(file))
 }
 
 /// Why bytes are not an image: a [`Problem`] that does not know its file yet.
@@ -43,6 +43,10 @@ pub(super) struct Refused {
 impl Refused {
     pub(super) fn new(what: impl Into<String>, hint: impl Into<String>) -> Refused {
         Refused { what: what.into(), hint: hint.into() }
+    }
+
+    pub(super) fn problem(self, file: &Path) -> Problem {
+        Problem::files(self.what).at(At::file(file)).hint(self.hint)
     }
 
     pub(super) fn damaged(why: &dyn Display) -> Refused {

@@ -107,6 +107,11 @@ pub fn png_text(bytes: &[u8], file: &Path) -> Result<Vec<(String, String)>, Prob
     Ok(text)
 }
 
+/// What an EXR says of itself, as [`Image::encode`] wrote it.
+pub fn exr_text(bytes: &[u8], file: &Path) -> Result<Vec<(String, String)>, Problem> {
+    exr::text(bytes).map_err(|refused| refused.problem(file))
+}
+
 /// Writes a file so that whoever looks finds the old content or the new, never a part: aside in the same folder, then
 /// renamed. Folders that are missing are made. A link is followed, and a device or pipe is written to as it is.
 pub fn write_file(file: &Path, bytes: &[u8]) -> Result<(), Problem> {

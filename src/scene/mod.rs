@@ -247,3 +247,22 @@ impl Default for ReferenceSettings {
         ReferenceSettings { max_error: 0.02, max_spp: 4096, max_depth: 512, seed: 1 }
     }
 }
+
+/// Which of its three summands a picture shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Part {
+    #[default]
+    Full,
+    /// Entered, scattered at least once, left.
+    Scattered,
+    /// Reflected at the boundary.
+    Glossy,
+    /// Passed through without scattering; what is seen of the surroundings and of lights.
+    Unscattered,
+}
+
+impl Part {
+    pub fn has(self, part: Part) -> bool {
+        self == Part::Full || self == part
+    }
+}

@@ -1,0 +1,325 @@
+//! The truth: light followed on the CPU, in f64, against which every technique is measured. It shares the optics, the
+//! meshes and the scene with the frame that the device draws, and no other code: that independence is its worth.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`volume`] | the integrator: unbiased random walks through the media |
+//! | [`boundary`] | reflection and refraction, smooth and rough |
+//! | [`refracted`] | lamps without extent, seen from inside through a smooth boundary |
+//! | [`light`] | lamps and the surroundings |
+//! | [`world`] | the scene as rays see it |
+//! | [`film`] | means, variances, parts, tiles |
+//!
+//! Samples are added in steps that double their number; each step is a bake, named by the one before, so that what was
+//! interrupted goes on where it was. The same seed gives the same bits on any number of threads.
+//!
+//! Re-runs when: anything in the scene that light could meet changes, the camera, the size, or this room's code.
+
+pub mod boundary;
+pub mod film;
+pub mod light;
+pub mod random;
+pub mod refracted;
+pub mod volume;
+pub mod world;
+
+use crate::geometry::mesh::Mesh;
+use crate::image::Texture;
+use crate::optics::Rgb;
+use crate::problem::Problem;
+use crate::scene::{Camera, LightKind, Object, Scene, Sky, Substance, shape};
+use crate::store::{Bake, Key, Plan, Run, Slot, Step};
+use film::{Film, Moments};
+use glam::{DAffine3, DMat3, DVec3};
+use light::{Kind, Lamp, SkyImage};
+use random::Random;
+use rayon::prelude::*;
+use refracted::Refracted;
+use serde::Serialize;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use volume::{Inside, Light, Tracer};
+use world::{Boundary, Matter, Medium, Thing, World};
+
+/// Which picture, and how far to go.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    pub light: Light,
+    pub camera: Camera,
+    pub size: (u32, u32),
+    pub time_s: f64,
+    pub max_depth: u32,
+    pub seed: u64,
+    /// Every `step`-th row from `first` on: (first, step).
+    pub rows: (u32, u32),
+}
+
+/// Adds the steps that bring the picture to `samples` per pixel: one for each doubling.
+pub fn plan(plan: &mut Plan, scene: &Scene, settings: &Settings, samples: u64) -> Slot<Film> {
+    let tracer = tracer(plan, scene, settings);
+    let mut film = None;
+    let mut done = 0;
+    while done < samples {
+        let upto = (2 * done).max(1).min(samples);
+        film = Some(plan.bake(Trace {
+            tracer,
+            camera: settings.camera,
+            size: settings.size,
+            seed: settings.seed,
+            rows: settings.rows,
+            samples: (done, upto),
+            before: film,
+        }));
+        done = upto;
+    }
+    film.unwrap_or_else(|| {
+        plan.bake(Trace {
+            tracer,
+            camera: settings.camera,
+            size: settings.size,
+            seed: settings.seed,
+            rows: settings.rows,
+            samples: (0, 1),
+            before: None,
+        })
+    })
+}
+
+fn tracer(plan: &mut Plan, scene: &Scene, settings: &Settings) -> Slot<Tracer> {
+    let mut things = Vec::new();
+    let mut lamps = Vec::new();
+    let mut sky = None;
+    for object in scene.objects.iter().filter(|object| object.visible) {
+        let (_, rotation, translation) = object.transform.world_from_object().to_scale_rotation_translation();
+        things.push(Placed {
+            mesh: shape::mesh(plan, object, settings.time_s),
+            world_from_object: DAffine3::from_rotation_translation(rotation, translation),
+            matter: matter(object, scene.mm_per_unit),
+        });
+    }
+    for light in scene.lights.iter().filter(|light| light.enabled) {
+        let kind = match &light.kind {
+            LightKind::Directional { direction, irradiance } => {
+                Kind::Directional { direction: *direction, irradiance: *irradiance }
+            }
+            LightKind::Point { position, intensity } => Kind::Point { position: *position, intensity: *intensity },
+            LightKind::Rect { center, u, v, radiance } => {
+                things.push(Placed {
+                    mesh: shape::quad(plan, &light.name, *u, *v),
+                    world_from_object: DAffine3::from_translation(*center),
+                    matter: Matter::Emitter(lamps.len()),
+                });
+                Kind::Rect { center: *center, u: *u, v: *v, radiance: *radiance }
+            }
+            LightKind::Environment { sky: seen, scale, rotation_deg } => {
+                let (scale, image) = match seen {
+                    Sky::Constant(radiance) => (*scale * *radiance, None),
+                    Sky::Image(map) => {
+                        let about = map.path.display().to_string();
+                        (Rgb::splat(*scale), Some(plan.given("image.file", about, Key::of(map), map.texture.clone())))
+                    }
+                };
+                sky = Some(SkyText { scale, image, rotation: rotation_deg.to_radians(), shadow: light.shadow });
+                continue;
+            }
+        };
+        lamps.push(Lamp { kind, shadow: light.shadow });
+    }
+    plan.add(BuildTracer { things, lamps, sky, light: settings.light, max_depth: settings.max_depth })
+}
+
+/// What an object is made of, with coefficients per scene unit.
+fn matter(object: &Object, mm_per_unit: f64) -> Matter {
+    let material = &object.material;
+    let surface = Boundary {
+        ior: material.surface.ior,
+        roughness: material.surface.roughness.clone(),
+        color: material.surface.color.clone(),
+    };
+    match &material.medium {
+        Substance::Opaque { albedo } => Matter::Opaque { surface, albedo: *albedo },
+        Substance::Translucent(medium) => Matter::Translucent {
+            surface,
+            medium: Medium {
+                sigma_a: medium.sigma_a * mm_per_unit,
+                sigma_s: medium.sigma_s * mm_per_unit,
+                phase: material.phase,
+                parameter: Rgb::from_array(medium.g.to_array().map(|g| material.phase.parameter(g))),
+            },
+        },
+    }
+}
+
+#[derive(Serialize)]
+struct Placed {
+    mesh: Slot<Mesh>,
+    /// Rigid: scale is in the mesh.
+    world_from_object: DAffine3,
+    matter: Matter,
+}
+
+#[derive(Serialize)]
+struct SkyText {
+    scale: Rgb,
+    image: Option<Slot<Texture>>,
+    rotation: f64,
+    shadow: bool,
+}
+
+/// The scene, ready for rays.
+#[derive(Serialize)]
+struct BuildTracer {
+    things: Vec<Placed>,
+    lamps: Vec<Lamp>,
+    sky: Option<SkyText>,
+    light: Light,
+    max_depth: u32,
+}
+
+impl Step for BuildTracer {
+    type Output = Tracer;
+    fn name(&self) -> &'static str {
+        "reference.world"
+    }
+    fn about(&self) -> String {
+        let things = crate::problem::counted(self.things.len(), "thing");
+        format!("{things} ready for rays, and the beams that lamps send into them")
+    }
+    fn run(&self, run: &Run) -> Result<Tracer, Problem> {
+        let things = self
+            .things
+            .iter()
+            .map(|placed| Thing {
+                mesh: run.get(placed.mesh),
+                world_from_object: placed.world_from_object,
+                turn: DMat3::from(placed.world_from_object.matrix3),
+                matter: placed.matter.clone(),
+            })
+            .collect();
+        let world = World::new(things);
+        let mut refracted = Vec::new();
+        for (i, lamp) in self.lamps.iter().enumerate() {
+            for thing in 0..world.things.len() {
+                run.tick(i as f64 / self.lamps.len() as f64)?;
+                refracted.extend(Refracted::new(&world, i, &lamp.kind, thing));
+            }
+        }
+        let lamp_of = world
+            .things
+            .iter()
+            .map(|thing| match thing.matter {
+                Matter::Emitter(lamp) => Some(lamp),
+                _ => None,
+            })
+            .collect();
+        let sky = self.sky.as_ref().map(|sky| light::Sky {
+            scale: sky.scale,
+            image: sky.image.map(|image| SkyImage::new(run.get(image), sky.rotation)),
+            shadow: sky.shadow,
+        });
+        let lamps = self.lamps.clone();
+        Ok(Tracer { world, lamps, sky, lamp_of, refracted, light: self.light, max_depth: self.max_depth, joins: true })
+    }
+}
+
+/// More samples of every pixel, added to those before.
+#[derive(Serialize)]
+struct Trace {
+    tracer: Slot<Tracer>,
+    camera: Camera,
+    size: (u32, u32),
+    seed: u64,
+    rows: (u32, u32),
+    /// From and up to.
+    samples: (u64, u64),
+    before: Option<Slot<Film>>,
+}
+
+impl Step for Trace {
+    type Output = Film;
+    fn name(&self) -> &'static str {
+        "reference.trace"
+    }
+    fn about(&self) -> String {
+        format!("paths {} to {} of each pixel", self.samples.0 + 1, self.samples.1)
+    }
+    fn run(&self, run: &Run) -> Result<Film, Problem> {
+        let tracer = run.get(self.tracer);
+        let before = self.before.map(|slot| run.get(slot));
+        let ((width, height), (first, step)) = (self.size, self.rows);
+        let count = Film::rows(first, step, height);
+        let eye = Eye::new(&self.camera, self.size);
+        let inside = around(&tracer.world, self.camera.eye);
+        let done = AtomicUsize::new(0);
+        let rows: Vec<Vec<film::Pixel>> = (0..count)
+            .into_par_iter()
+            .map(|row| {
+                let y = first + row * step;
+                let pixels = (0..width)
+                    .map(|x| {
+                        let mut moments = Moments::default();
+                        let pixel = y as u64 * width as u64 + x as u64;
+                        for sample in self.samples.0..self.samples.1 {
+                            let mut random = Random::new(self.seed, pixel, sample);
+                            let (a, b) = random.pair();
+                            let direction = eye.direction(x as f64 + a, y as f64 + b);
+                            let (parts, is_object) = tracer.trace(self.camera.eye, direction, inside, &mut random);
+                            moments.add(&parts, is_object);
+                        }
+                        let place = (row * width + x) as usize;
+                        let earlier = before.as_ref().map(|film| (&film.pixels[place], film.samples));
+                        moments.pixel(earlier)
+                    })
+                    .collect();
+                let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+                run.tick(done as f64 / count as f64).map(|()| pixels)
+            })
+            .collect::<Result<_, Problem>>()?;
+        Ok(Film { width, height, first, step, samples: self.samples.1, pixels: rows.concat() })
+    }
+}
+
+impl Bake for Trace {
+    const CODE: &'static [&'static str] = &["src/reference/", "src/optics/", "src/geometry/", "src/scene/shape.rs"];
+}
+
+/// A pinhole camera's rays.
+struct Eye {
+    forward: DVec3,
+    right: DVec3,
+    up: DVec3,
+    size: (f64, f64),
+}
+
+impl Eye {
+    fn new(camera: &Camera, (width, height): (u32, u32)) -> Eye {
+        let forward = (camera.target - camera.eye).normalize();
+        let right = forward.cross(camera.up).normalize();
+        let pixel = 2.0 * (0.5 * camera.fov_y_deg.to_radians()).tan() / height as f64;
+        let up = right.cross(forward);
+        Eye { forward, right: pixel * right, up: pixel * up, size: (width as f64, height as f64) }
+    }
+
+    /// Through a place in the picture, in pixels from its top left.
+    fn direction(&self, x: f64, y: f64) -> DVec3 {
+        let (x, y) = (x - 0.5 * self.size.0, y - 0.5 * self.size.1);
+        (self.forward + x * self.right - y * self.up).normalize()
+    }
+}
+
+/// The closed translucent things in which a point lies: those whose boundary a ray leaves more often than it enters.
+fn around(world: &World, p: DVec3) -> Inside {
+    // Any direction will do; one that is parallel to nothing meets no edge.
+    let direction = DVec3::new(0.5377, 0.6251, 0.5657).normalize();
+    let mut crossings = vec![0i32; world.things.len()];
+    let (mut origin, mut on) = (p, None);
+    while let Some(point) = world.meet(origin, direction, f64::INFINITY, on) {
+        crossings[point.thing()] += if direction.dot(point.flat) > 0.0 { 1 } else { -1 };
+        (origin, on) = (point.p, Some(point.place));
+    }
+    let is_around =
+        |thing: &usize| crossings[*thing] > 0 && matches!(world.things[*thing].matter, Matter::Translucent { .. });
+    (0..world.things.len()).filter(is_around).fold(Inside::default(), |inside, thing| inside.with(thing))
+}
+
+#[cfg(test)]
+mod tests;

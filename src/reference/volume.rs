@@ -1,0 +1,623 @@
+//! The volumetric truth: unbiased random walks through homogeneous media inside any closed mesh, in f64.
+//!
+//! A path starts at the eye. Free paths are exponential, directions follow the phase function, boundaries reflect and
+//! refract by Fresnel or by GGX microfacets; nothing is approximated. One path serves three channels: its free paths are
+//! drawn for one of them, and its weight is the balance heuristic over all three (spectral multiple importance sampling
+//! [Wilkie2014]), so that no channel's weight exceeds 3. Lamps are joined to each vertex that can see them; those
+//! without extent also through a smooth refracting boundary ([`super::refracted`]), where no path would find them.
+//!
+//! Radiance is counted per squared index of the medium that it travels in. Lengths are scene units.
+
+use super::boundary::Facing;
+use super::light::{Lamp, Ray, Sky};
+use super::random::Random;
+use super::refracted::Refracted;
+use super::world::{Boundary, Matter, Medium, Place, Point, Thing, World};
+use crate::optics::Rgb;
+use crate::optics::fresnel::{diffuse_transmittance, fresnel_dielectric};
+use glam::DVec3;
+use std::f64::consts::PI;
+
+/// Which light counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub enum Light {
+    /// Light source, object, eye: what real-time methods make.
+    Direct,
+    /// Also what leaves one place and enters another.
+    Full,
+}
+
+/// What one path brings, by part.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Parts {
+    pub scattered: Rgb,
+    pub glossy: Rgb,
+    pub unscattered: Rgb,
+}
+
+/// All that a path needs to know.
+pub struct Tracer {
+    pub world: World,
+    pub lamps: Vec<Lamp>,
+    pub sky: Option<Sky>,
+    /// Which lamp each emitter of the world is.
+    pub lamp_of: Vec<Option<usize>>,
+    pub refracted: Vec<Refracted>,
+    pub light: Light,
+    pub max_depth: u32,
+    /// Whether lamps with extent and the sky are joined to vertices. Without, paths must find them by themselves: the same
+    /// picture, with more noise.
+    pub joins: bool,
+}
+
+/// The things in which a point lies, innermost last.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Inside {
+    things: [u32; 4],
+    count: usize,
+}
+
+impl Inside {
+    fn innermost(&self) -> Option<usize> {
+        self.count.checked_sub(1).map(|last| self.things[last] as usize)
+    }
+
+    /// Things that lie in one another more than four deep count as four.
+    pub fn with(mut self, thing: usize) -> Inside {
+        if self.count < self.things.len() {
+            self.things[self.count] = thing as u32;
+            self.count += 1;
+        }
+        self
+    }
+
+    pub fn without(mut self, thing: usize) -> Inside {
+        if let Some(place) = self.things[..self.count].iter().rposition(|t| *t as usize == thing) {
+            self.things.copy_within(place + 1..self.count, place);
+            self.count -= 1;
+        }
+        self
+    }
+}
+
+/// Weights of a path whose free paths are drawn for one channel.
+#[derive(Clone, Copy)]
+struct Weight {
+    /// What a path's light is multiplied by.
+    value: Rgb,
+    /// The density with which each channel would have drawn this path, over their mean.
+    density: Rgb,
+    hero: usize,
+}
+
+impl Weight {
+    fn new(random: &mut Random) -> Weight {
+        Weight { value: Rgb::ONE, density: Rgb::ONE, hero: random.choice(3) }
+    }
+
+    /// The density of all channels together of a choice that each would make with these densities.
+    fn mixed(&self, density: Rgb) -> f64 {
+        (self.density * density).element_sum() / self.density.element_sum()
+    }
+
+    /// After an event that has these values and, if drawn for each channel, these densities.
+    fn event(&mut self, value: Rgb, density: Rgb) {
+        let density = self.density * density;
+        let mean = density.element_sum() / 3.0;
+        self.value *= value / mean;
+        self.density = density / mean;
+    }
+}
+
+/// A path on its way.
+struct Walk {
+    origin: DVec3,
+    direction: DVec3,
+    on: Option<Place>,
+    inside: Inside,
+    weight: Weight,
+    /// Of `direction`, where a lamp could have been joined to the path's last vertex instead.
+    density: Option<f64>,
+    /// Whether what shines along this ray, in the open, was added already.
+    counted: bool,
+    /// Multiplies the light once it has scattered.
+    color: Rgb,
+    scattered: bool,
+    depth: u32,
+    sum: Sum,
+}
+
+/// Light by whether it was scattered.
+#[derive(Clone, Copy, Default)]
+struct Sum {
+    scattered: Rgb,
+    unscattered: Rgb,
+}
+
+impl Walk {
+    fn add(&mut self, light: Rgb) {
+        let light = self.weight.value * light;
+        match self.scattered {
+            true => self.sum.scattered += self.color * light,
+            false => self.sum.unscattered += light,
+        }
+    }
+}
+
+impl Tracer {
+    /// One path from the eye, which lies inside the things `inside`; and whether it meets an object.
+    pub fn trace(&self, eye: DVec3, direction: DVec3, inside: Inside, random: &mut Random) -> (Parts, bool) {
+        let mut parts = Parts::default();
+        if inside.count > 0 {
+            // From within a medium there is no boundary to split at.
+            let light = self.walk_from(self.start(eye, direction, None, inside, random), None, random);
+            (parts.scattered, parts.unscattered) = (light.scattered, light.unscattered);
+            return (parts, true);
+        }
+        let Some(point) = self.world.meet(eye, direction, f64::INFINITY, None) else {
+            parts.unscattered = self.sky.as_ref().map_or(Rgb::ZERO, |sky| sky.radiance(direction));
+            return (parts, false);
+        };
+        (self.seen(&point, direction, random), !self.is_emitter(&point))
+    }
+
+    /// What a surface sends to the eye.
+    fn seen(&self, point: &Point, direction: DVec3, random: &mut Random) -> Parts {
+        let mut parts = Parts::default();
+        let thing = &self.world.things[point.thing()];
+        match &thing.matter {
+            Matter::Emitter(_) => {
+                parts.unscattered = self.emitted(point, direction).map_or(Rgb::ZERO, |(light, _)| light)
+            }
+            Matter::Opaque { surface, albedo } => {
+                parts.glossy = self.gloss(thing, surface, point, direction, random);
+                parts.scattered = self.diffuse(thing, surface, *albedo, point, direction, 0, random);
+            }
+            Matter::Translucent { .. } if direction.dot(point.flat) > 0.0 => {
+                // The back of a mesh that is not closed: nothing is entered.
+                parts.unscattered = self.radiance(point.p, direction, point.place, None, 1, random);
+            }
+            Matter::Translucent { surface, .. } => {
+                parts.glossy = self.gloss(thing, surface, point, direction, random);
+                let facing = self.facing(thing, surface, point, direction, Inside::default());
+                let (into, share) = match facing.is_smooth() {
+                    true => {
+                        let split = facing.split(direction);
+                        (split.refracted, 1.0 - split.reflectance)
+                    }
+                    false => {
+                        let h = facing.microfacet(direction, random.pair());
+                        let split = facing.split_at(direction, h);
+                        let unhidden = split.refracted.map_or(0.0, |to| facing.unhidden(direction, to, false));
+                        (split.refracted, (1.0 - split.reflectance) * unhidden)
+                    }
+                };
+                let Some(into) = into.filter(|_| share > 0.0) else { return parts };
+                let inside = Inside::default().with(point.thing());
+                let mut walk = self.start(point.p, into, Some(point.place), inside, random);
+                walk.color = thing.color(surface, point);
+                walk.depth = 1;
+                let light = self.walk_from(walk, None, random);
+                (parts.scattered, parts.unscattered) = (share * light.scattered, share * light.unscattered);
+            }
+        }
+        parts
+    }
+
+    fn start(&self, origin: DVec3, direction: DVec3, on: Option<Place>, inside: Inside, random: &mut Random) -> Walk {
+        Walk {
+            origin,
+            direction,
+            on,
+            inside,
+            weight: Weight::new(random),
+            density: None,
+            counted: false,
+            color: Rgb::ONE,
+            scattered: false,
+            depth: 0,
+            sum: Sum::default(),
+        }
+    }
+
+    /// All light along a ray through nothing, from a surface on: of everything for full light, of lamps and sky for direct.
+    fn radiance(&self, p: DVec3, d: DVec3, on: Place, density: Option<f64>, depth: u32, random: &mut Random) -> Rgb {
+        let met = self.world.meet(p, d, f64::INFINITY, Some(on));
+        let light = self.shining(p, d, met.as_ref(), density);
+        if self.light == Light::Direct || met.is_none() {
+            return light;
+        }
+        let mut walk = self.start(p, d, Some(on), Inside::default(), random);
+        (walk.density, walk.depth, walk.counted) = (density, depth, true);
+        let sum = self.walk_from(walk, met, random);
+        light + sum.scattered + sum.unscattered
+    }
+
+    /// What lamps with extent and the sky send along a ray in empty space, of which a vertex with that density of
+    /// directions takes its share; `met` is what the ray meets first.
+    fn shining(&self, p: DVec3, d: DVec3, met: Option<&Point>, density: Option<f64>) -> Rgb {
+        let density = density.filter(|_| self.joins);
+        let share = |own: f64| density.map_or(1.0, |density| density / (density + own));
+        let mut sum = Rgb::ZERO;
+        if let Some(sky) = &self.sky
+            && (met.is_none() || !sky.shadow)
+        {
+            sum += share(sky.density(d)) * sky.radiance(d);
+        }
+        for (i, lamp) in self.lamps.iter().enumerate().filter(|(_, lamp)| lamp.has_extent()) {
+            let seen = match lamp.shadow {
+                true => met.filter(|point| self.lamp_of[point.thing()] == Some(i)).map(|point| point.t * d),
+                false => lamp.meet(p, d),
+            };
+            if let Some((radiance, own)) = seen.and_then(|to| lamp.radiance(to)) {
+                sum += share(own) * radiance;
+            }
+        }
+        sum
+    }
+
+    fn medium(&self, inside: Inside) -> Option<&Medium> {
+        inside.innermost().map(|i| match &self.world.things[i].matter {
+            Matter::Translucent { medium, .. } => medium,
+            _ => unreachable!("paths enter only what is translucent"),
+        })
+    }
+
+    fn sigma_t(&self, inside: Inside) -> Rgb {
+        self.medium(inside).map_or(Rgb::ZERO, Medium::sigma_t)
+    }
+
+    fn is_emitter(&self, point: &Point) -> bool {
+        matches!(self.world.things[point.thing()].matter, Matter::Emitter(_))
+    }
+
+    fn emitted(&self, point: &Point, d: DVec3) -> Option<(Rgb, f64)> {
+        let lamp = self.lamp_of[point.thing()]?;
+        self.lamps[lamp].radiance(point.t * d)
+    }
+
+    fn facing(&self, thing: &Thing, surface: &Boundary, point: &Point, d: DVec3, inside: Inside) -> Facing {
+        let enters = d.dot(point.flat) < 0.0;
+        let index = |inside: Inside| {
+            inside.innermost().map_or(1.0, |i| match &self.world.things[i].matter {
+                Matter::Translucent { surface, .. } => surface.ior,
+                _ => 1.0,
+            })
+        };
+        let beyond = if enters { surface.ior } else { index(inside.without(point.thing())) };
+        let side = if enters { 1.0 } else { -1.0 };
+        Facing {
+            flat: side * point.flat,
+            normal: side * point.normal,
+            eta: beyond / index(inside),
+            roughness: thing.roughness(surface, point),
+        }
+    }
+
+    /// Light reflected at the outside of a boundary.
+    fn gloss(&self, thing: &Thing, surface: &Boundary, point: &Point, d: DVec3, random: &mut Random) -> Rgb {
+        if surface.ior == 1.0 || d.dot(point.flat) >= 0.0 {
+            return Rgb::ZERO;
+        }
+        let facing = Facing {
+            flat: point.flat,
+            normal: point.normal,
+            eta: surface.ior,
+            roughness: thing.roughness(surface, point),
+        };
+        if facing.is_smooth() {
+            let split = facing.split(d);
+            return split.reflectance * self.radiance(point.p, split.reflected, point.place, None, 1, random);
+        }
+        let mut sum = self.joined(point, random, |to| {
+            let (value, density) = facing.value(d, to);
+            if to.dot(point.flat) > 0.0 { (value, density) } else { (0.0, 0.0) }
+        });
+        let h = facing.microfacet(d, random.pair());
+        let split = facing.split_at(d, h);
+        let unhidden = facing.unhidden(d, split.reflected, true);
+        if unhidden > 0.0 {
+            let density = facing.value(d, split.reflected).1;
+            let light = self.radiance(point.p, split.reflected, point.place, Some(density), 1, random);
+            sum += split.reflectance * unhidden * light;
+        }
+        sum
+    }
+
+    /// Light scattered by an opaque surface: Lambertian under its boundary, all of the albedo leaving.
+    #[expect(clippy::too_many_arguments, reason = "a surface, a point of it, and a path")]
+    fn diffuse(
+        &self,
+        thing: &Thing,
+        surface: &Boundary,
+        albedo: Rgb,
+        point: &Point,
+        d: DVec3,
+        depth: u32,
+        random: &mut Random,
+    ) -> Rgb {
+        // A sheet is seen from behind too: its normal turns to the eye.
+        let side = if d.dot(point.flat) < 0.0 { 1.0 } else { -1.0 };
+        let (flat, normal) = (side * point.flat, side * point.normal);
+        let enters = |cos: f64| 1.0 - fresnel_dielectric(cos.clamp(0.0, 1.0), surface.ior);
+        let leaving = enters(-d.dot(normal)) / (PI * diffuse_transmittance(surface.ior));
+        let scale = thing.color(surface, point) * albedo * leaving;
+        let mut sum = self.joined(point, random, |to| {
+            let cos = to.dot(normal);
+            if cos > 0.0 && to.dot(flat) > 0.0 { (enters(cos) * cos, cos / PI) } else { (0.0, 0.0) }
+        });
+        let (u, v) = random.pair();
+        let (x, y) = normal.any_orthonormal_pair();
+        let (sin, cos) = (2.0 * PI * v).sin_cos();
+        let to = u.sqrt() * (cos * x + sin * y) + (1.0 - u).sqrt() * normal;
+        if to.dot(flat) > 0.0 {
+            let cos = to.dot(normal);
+            sum += PI * enters(cos) * self.radiance(point.p, to, point.place, Some(cos / PI), depth + 1, random);
+        }
+        scale * sum
+    }
+
+    /// Light of all lamps and of the sky's image at a point outside, each from one direction: `value` gives a surface's
+    /// value times cosine for a direction, and the density with which the surface itself would have chosen it.
+    fn joined(&self, point: &Point, random: &mut Random, value: impl Fn(DVec3) -> (f64, f64)) -> Rgb {
+        let mut sum = Rgb::ZERO;
+        let mut add = |ray: Ray, shadow: bool| {
+            let (value, density) = value(ray.direction);
+            if value > 0.0 && (!shadow || self.reaches(point.p, &ray, Some(point.place))) {
+                let share = ray.density.map_or(1.0, |own| own / (own + density));
+                sum += share * value * ray.irradiance;
+            }
+        };
+        for lamp in self.lamps.iter().filter(|lamp| self.is_joined(lamp)) {
+            if let Some(ray) = lamp.sample(point.p, random) {
+                add(ray, lamp.shadow);
+            }
+        }
+        if let Some((ray, shadow)) = self.sky_sample(random) {
+            add(ray, shadow);
+        }
+        sum
+    }
+
+    fn is_joined(&self, lamp: &Lamp) -> bool {
+        self.joins || !lamp.has_extent()
+    }
+
+    fn sky_sample(&self, random: &mut Random) -> Option<(Ray, bool)> {
+        let sky = self.sky.as_ref().filter(|_| self.joins)?;
+        Some((sky.sample(random)?, sky.shadow))
+    }
+
+    /// Whether nothing is between a point and a lamp.
+    fn reaches(&self, p: DVec3, ray: &Ray, on: Option<Place>) -> bool {
+        // The lamp itself stands at the end.
+        self.world.is_free(p, ray.direction, ray.distance * (1.0 - 1e-9), on)
+    }
+
+    /// Follows a path to its end. `met` is what its ray meets first, if that is known already.
+    fn walk_from(&self, mut walk: Walk, mut met: Option<Point>, random: &mut Random) -> Sum {
+        while walk.depth < self.max_depth {
+            let medium = self.medium(walk.inside);
+            let sigma_t = medium.map_or(Rgb::ZERO, Medium::sigma_t);
+            let free = match sigma_t[walk.weight.hero] {
+                0.0 => f64::INFINITY,
+                sigma => random.exponential() / sigma,
+            };
+            let point = met.take().or_else(|| self.world.meet(walk.origin, walk.direction, free, walk.on));
+            walk.depth += 1;
+            if medium.is_none() && !std::mem::replace(&mut walk.counted, false) {
+                walk.add(self.shining(walk.origin, walk.direction, point.as_ref(), walk.density));
+            }
+            match (point, medium) {
+                (Some(point), _) => {
+                    let through = (-sigma_t * point.t).exp();
+                    walk.weight.event(through, through);
+                    if !self.cross(&mut walk, point, random) {
+                        return walk.sum;
+                    }
+                }
+                (None, Some(medium)) if free.is_finite() => {
+                    let through = (-sigma_t * free).exp();
+                    walk.weight.event(medium.sigma_s * through, sigma_t * through);
+                    walk.origin += free * walk.direction;
+                    walk.on = None;
+                    self.scatter(&mut walk, medium, random);
+                }
+                // Away; or out of a mesh that is not closed, where nobody can tell what light would come.
+                (None, _) => return walk.sum,
+            }
+            // Roulette by weight: what is left of the light decides, so that high albedos live long.
+            let left = walk.weight.value.max_element();
+            if left < 0.1 {
+                if random.unit() >= left / 0.1 {
+                    return walk.sum;
+                }
+                walk.weight.value *= 0.1 / left;
+            }
+        }
+        walk.sum
+    }
+
+    /// A path meets a medium's particle: light that is scattered there, and the way on.
+    fn scatter(&self, walk: &mut Walk, medium: &Medium, random: &mut Random) {
+        walk.scattered = true;
+        let from = walk.direction;
+        // Channels may scatter differently: the direction is drawn for the hero, and weighs like a free path.
+        let phase =
+            |to: DVec3| Rgb::from_array(medium.parameter.to_array().map(|k| medium.phase.value(-from.dot(to), k)));
+        self.join_lamps(walk, |lamp| self.is_joined(lamp), phase, random);
+        if let Some((ray, shadow)) = self.sky_sample(random) {
+            self.join(walk, &ray, shadow, phase(ray.direction));
+        }
+        let parameter = medium.parameter[walk.weight.hero];
+        walk.direction = around(from, -medium.phase.sample(random.unit(), parameter), random.unit());
+        let values = phase(walk.direction);
+        walk.density = Some(walk.weight.mixed(values));
+        walk.weight.event(values, values);
+    }
+
+    /// Adds the light of lamps at a vertex in a medium, `phase` being the share that goes on along the path, 1/sr.
+    fn join_lamps(
+        &self,
+        walk: &mut Walk,
+        wanted: impl Fn(&Lamp) -> bool,
+        phase: impl Fn(DVec3) -> Rgb,
+        random: &mut Random,
+    ) {
+        let innermost = walk.inside.innermost();
+        for (i, lamp) in self.lamps.iter().enumerate().filter(|(_, lamp)| wanted(lamp)) {
+            for refracted in self.refracted.iter().filter(|r| r.lamp == i && Some(r.thing) == innermost) {
+                refracted.each(&self.world, walk.origin, self.sigma_t(walk.inside), lamp.shadow, |to, light| {
+                    walk.sum.scattered += walk.color * walk.weight.value * phase(to) * light;
+                });
+            }
+            if let Some(ray) = lamp.sample(walk.origin, random) {
+                self.join(walk, &ray, lamp.shadow, phase(ray.direction));
+            }
+        }
+    }
+
+    /// Adds a lamp's light at a vertex in a medium, straight through boundaries that do not refract.
+    fn join(&self, walk: &mut Walk, ray: &Ray, shadow: bool, phase: Rgb) {
+        let (mut p, mut on, mut inside, mut left) = (walk.origin, walk.on, walk.inside, ray.distance);
+        let mut through = Rgb::ONE;
+        let mut is_out = false;
+        loop {
+            let met = self.world.meet(p, ray.direction, left * (1.0 - 1e-9), on);
+            if inside.count > 0 {
+                let length = met.as_ref().map_or(left, |point| point.t);
+                through *= (-self.sigma_t(inside) * length).exp();
+            }
+            let Some(point) = met else { break };
+            if is_out && !shadow {
+                break;
+            }
+            let Matter::Translucent { surface, .. } = &self.world.things[point.thing()].matter else { return };
+            let leaves = ray.direction.dot(point.flat) > 0.0;
+            // Direct light is let in by the thing that it is scattered in, and by no other.
+            if surface.ior != 1.0 || self.light == Light::Direct && (is_out || !leaves) {
+                return;
+            }
+            inside = if leaves { inside.without(point.thing()) } else { inside.with(point.thing()) };
+            is_out = inside.innermost().is_none();
+            (p, on, left) = (point.p, Some(point.place), left - point.t);
+        }
+        let density = walk.weight.mixed(phase);
+        let share = ray.density.map_or(1.0, |own| own / (own + density));
+        walk.sum.scattered += share * walk.color * walk.weight.value * through * phase * ray.irradiance;
+    }
+
+    /// A path meets a surface; whether it goes on.
+    fn cross(&self, walk: &mut Walk, point: Point, random: &mut Random) -> bool {
+        let thing = &self.world.things[point.thing()];
+        let d = walk.direction;
+        let surface = match &thing.matter {
+            // In the open it was counted where the ray was cast.
+            Matter::Emitter(_) => {
+                if walk.inside.count > 0
+                    && let Some((radiance, own)) = self.emitted(&point, d)
+                {
+                    let share = walk.density.filter(|_| self.joins).map_or(1.0, |density| density / (density + own));
+                    walk.add(share * radiance);
+                }
+                return false;
+            }
+            Matter::Opaque { surface, albedo } => {
+                if walk.inside.count == 0 {
+                    let light = self.diffuse(thing, surface, *albedo, &point, d, walk.depth, random)
+                        + self.gloss(thing, surface, &point, d, random);
+                    walk.add(light);
+                    return false;
+                }
+                // An opaque thing within a medium: white paint whose boundary the medium wets.
+                walk.scattered = true;
+                let normal = if d.dot(point.normal) < 0.0 { point.normal } else { -point.normal };
+                let (u, v) = random.pair();
+                walk.weight.value *= *albedo * thing.color(surface, &point);
+                (walk.origin, walk.on) = (point.p, Some(point.place));
+                // Lamps with extent are found by the path itself.
+                self.join_lamps(walk, |lamp| !lamp.has_extent(), |to| Rgb::splat(to.dot(normal).max(0.0) / PI), random);
+                (walk.direction, walk.density) = (around(normal, u.sqrt(), v), None);
+                return true;
+            }
+            Matter::Translucent { surface, .. } => surface,
+        };
+        let enters = d.dot(point.flat) < 0.0;
+        let beyond = if enters { walk.inside.with(point.thing()) } else { walk.inside.without(point.thing()) };
+        let facing = self.facing(thing, surface, &point, d, walk.inside);
+        (walk.origin, walk.on) = (point.p, Some(point.place));
+        if facing.eta == 1.0 {
+            // Nothing happens to the path, and lamps could be joined through here.
+            walk.inside = beyond;
+            if beyond.innermost().is_some() || self.light == Light::Full {
+                return true;
+            }
+            // Direct light is let in by one thing only.
+            let met = self.world.meet(point.p, d, f64::INFINITY, Some(point.place));
+            walk.add(self.shining(point.p, d, met.as_ref(), walk.density));
+            return false;
+        }
+        let (split, reflected_share, refracted_share) = if facing.is_smooth() {
+            let split = facing.split(d);
+            (split, split.reflectance, 1.0 - split.reflectance)
+        } else {
+            if beyond.innermost().is_none() {
+                self.join_at(walk, &facing, &point, random);
+            }
+            let h = facing.microfacet(d, random.pair());
+            let split = facing.split_at(d, h);
+            let refracted = split.refracted.map_or(0.0, |to| facing.unhidden(d, to, false));
+            let reflected = facing.unhidden(d, split.reflected, true);
+            (split, split.reflectance * reflected, (1.0 - split.reflectance) * refracted)
+        };
+        let density = |to: DVec3| (!facing.is_smooth()).then(|| facing.value(d, to).1);
+        let out = split.refracted.filter(|_| refracted_share > 0.0);
+        if let (Some(to), None) = (out, beyond.innermost()) {
+            // Both ways: the light outside is looked up, and the path goes on inside.
+            let own = density(to);
+            let met = self.world.meet(point.p, to, f64::INFINITY, Some(point.place));
+            walk.add(refracted_share * self.shining(point.p, to, met.as_ref(), own));
+            let is_lit = met.is_some_and(|met| !self.is_emitter(&met));
+            if is_lit && self.light == Light::Full && random.unit() < 1.0 - split.reflectance {
+                walk.weight.value *= refracted_share / (1.0 - split.reflectance);
+                (walk.inside, walk.direction, walk.density, walk.counted) = (beyond, to, own, true);
+                return true;
+            }
+            // The share that went out does not stay; only for full light it was chosen between.
+            let chosen = is_lit && self.light == Light::Full;
+            walk.weight.value *= if chosen { reflected_share / split.reflectance } else { reflected_share };
+            (walk.direction, walk.density) = (split.reflected, None);
+            return reflected_share > 0.0;
+        }
+        let goes_in = out.is_some() && random.unit() >= split.reflectance;
+        if goes_in {
+            walk.weight.value *= refracted_share / (1.0 - split.reflectance);
+            (walk.direction, walk.inside) = (out.expect("it goes in"), beyond);
+        } else {
+            // Where nothing can be refracted this is certain, and else chosen with the reflectance.
+            let chance = if out.is_some() { split.reflectance } else { 1.0 };
+            walk.weight.value *= reflected_share / chance;
+            walk.direction = split.reflected;
+        }
+        walk.density = None;
+        walk.weight.value.max_element() > 0.0
+    }
+
+    /// Adds the light of lamps outside at a rough boundary that a path meets from inside.
+    fn join_at(&self, walk: &mut Walk, facing: &Facing, point: &Point, random: &mut Random) {
+        let d = walk.direction;
+        let light = self.joined(point, random, |to| match to.dot(point.flat) > 0.0 {
+            true => facing.value(d, to),
+            false => (0.0, 0.0),
+        });
+        walk.add(light);
+    }
+}
+
+/// The direction at a cosine from `axis`, turned about it by a share of the circle.
+fn around(axis: DVec3, cos: f64, turn: f64) -> DVec3 {
+    let (x, y) = axis.any_orthonormal_pair();
+    let sin = ((1.0 - cos) * (1.0 + cos)).max(0.0).sqrt();
+    let (s, c) = (2.0 * PI * turn).sin_cos();
+    (sin * c * x + sin * s * y + cos * axis).normalize()
+}

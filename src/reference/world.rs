@@ -1,0 +1,185 @@
+//! The scene as rays see it: every triangle of every visible object and area light in world space.
+
+use crate::geometry::bvh::{Bvh, Hit};
+use crate::geometry::mesh::Mesh;
+use crate::optics::Rgb;
+use crate::optics::phase::Phase;
+use crate::scene::{Channel, TextureMap, Varying};
+use glam::{DAffine3, DMat3, DVec3};
+use serde::Serialize;
+use std::sync::Arc;
+
+/// What a thing is made of. Lengths are scene units.
+#[derive(Clone, Debug, Serialize)]
+pub enum Matter {
+    /// Lambertian under a dielectric boundary.
+    Opaque {
+        surface: Boundary,
+        albedo: Rgb,
+    },
+    Translucent {
+        surface: Boundary,
+        medium: Medium,
+    },
+    /// An area light: its place in the scene's list.
+    Emitter(usize),
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub struct Boundary {
+    pub ior: f64,
+    pub roughness: Varying<f64>,
+    pub color: Varying<Rgb>,
+}
+
+/// Coefficients per scene unit, and the phase function's own parameter for each channel.
+#[derive(Clone, Debug, Serialize)]
+pub struct Medium {
+    pub sigma_a: Rgb,
+    pub sigma_s: Rgb,
+    pub phase: Phase,
+    pub parameter: Rgb,
+}
+
+impl Medium {
+    pub fn sigma_t(&self) -> Rgb {
+        self.sigma_a + self.sigma_s
+    }
+}
+
+pub struct Thing {
+    pub mesh: Arc<Mesh>,
+    pub world_from_object: DAffine3,
+    /// Turns normals.
+    pub turn: DMat3,
+    pub matter: Matter,
+}
+
+pub struct World {
+    pub bvh: Bvh,
+    pub things: Vec<Thing>,
+}
+
+/// A triangle of a thing: a ray that starts on it does not meet it again.
+pub type Place = (u32, u32);
+
+/// A point of a surface, in world space.
+#[derive(Clone, Copy, Debug)]
+pub struct Point {
+    pub p: DVec3,
+    /// Along the ray that found it.
+    pub t: f64,
+    pub place: Place,
+    pub barycentrics: glam::DVec2,
+    /// Of the triangle, outwards.
+    pub flat: DVec3,
+    /// Interpolated, on the same side.
+    pub normal: DVec3,
+}
+
+impl Point {
+    pub fn thing(&self) -> usize {
+        self.place.0 as usize
+    }
+}
+
+impl World {
+    pub fn new(things: Vec<Thing>) -> World {
+        let meshes: Vec<(&Mesh, DAffine3)> =
+            things.iter().map(|thing| (thing.mesh.as_ref(), thing.world_from_object)).collect();
+        World { bvh: Bvh::new(&meshes), things }
+    }
+
+    /// What a ray meets first within `t_max`, on either side; never the triangle `from` that it starts on.
+    pub fn meet(&self, origin: DVec3, direction: DVec3, t_max: f64, from: Option<Place>) -> Option<Point> {
+        let hit = self.bvh.closest_hit_but(origin, direction, t_max, from)?;
+        Some(self.point(origin, direction, hit))
+    }
+
+    fn point(&self, origin: DVec3, direction: DVec3, hit: Hit) -> Point {
+        let thing = &self.things[hit.object as usize];
+        let (flat, normal) = thing.normals(hit.triangle as usize, hit.barycentrics);
+        Point {
+            p: origin + hit.t * direction,
+            t: hit.t,
+            place: (hit.object, hit.triangle),
+            barycentrics: hit.barycentrics,
+            flat,
+            normal,
+        }
+    }
+
+    pub fn is_free(&self, origin: DVec3, direction: DVec3, t_max: f64, from: Option<Place>) -> bool {
+        self.bvh.closest_hit_but(origin, direction, t_max, from).is_none()
+    }
+}
+
+impl Thing {
+    /// The triangle's outward normal, and the interpolated one on the same side of it; the first for both where the second
+    /// vanishes.
+    pub fn normals(&self, triangle: usize, b: glam::DVec2) -> (DVec3, DVec3) {
+        let [i, j, k] = self.mesh.triangles[triangle].map(|v| self.mesh.normals[v as usize].as_dvec3());
+        let [p, q, r] = self.mesh.corners(triangle);
+        let flat = (self.turn * (q - p).cross(r - p)).normalize();
+        let mut normal = (self.turn * ((1.0 - b.x - b.y) * i + b.x * j + b.y * k)).normalize_or(flat);
+        if normal.dot(flat) < 0.0 {
+            normal = -normal;
+        }
+        (flat, normal)
+    }
+
+    /// Texture coordinates; v runs upwards.
+    fn uv(&self, point: &Point) -> (f64, f64) {
+        if self.mesh.uvs.is_empty() {
+            return (0.0, 0.0);
+        }
+        let [i, j, k] = self.mesh.triangles[point.place.1 as usize].map(|v| self.mesh.uvs[v as usize].as_dvec2());
+        let b = point.barycentrics;
+        let uv = (1.0 - b.x - b.y) * i + b.x * j + b.y * k;
+        (uv.x, uv.y)
+    }
+
+    pub fn color(&self, surface: &Boundary, point: &Point) -> Rgb {
+        match &surface.color {
+            Varying::Constant(color) => *color,
+            Varying::Texture(map) => {
+                let [r, g, b, _] = texel(map, self.uv(point));
+                Rgb::new(r, g, b)
+            }
+        }
+    }
+
+    pub fn roughness(&self, surface: &Boundary, point: &Point) -> f64 {
+        match &surface.roughness {
+            Varying::Constant(roughness) => *roughness,
+            Varying::Texture(map) => {
+                let texel = texel(map, self.uv(point));
+                let value = texel[match map.channel {
+                    Channel::R => 0,
+                    Channel::G => 1,
+                    Channel::B => 2,
+                    Channel::A => 3,
+                }];
+                let value = if map.invert { 1.0 - value } else { value };
+                map.range.0 + (map.range.1 - map.range.0) * value
+            }
+        }
+    }
+}
+
+/// Bilinear, repeating, v upwards.
+fn texel(map: &TextureMap, (u, v): (f64, f64)) -> [f64; 4] {
+    let image = &map.texture;
+    let place = |at: f64, size: u32| {
+        let at = at * size as f64 - 0.5;
+        let low = at.floor();
+        let wrap = |i: f64| i.rem_euclid(size as f64) as u32;
+        (wrap(low), wrap(low + 1.0), at - low)
+    };
+    let ((x0, x1, fx), (y0, y1, fy)) = (place(u, image.width), place(1.0 - v, image.height));
+    let at = |x: u32, y: u32, c: usize| image.texels[(y * image.width + x) as usize][c] as f64;
+    std::array::from_fn(|c| {
+        let row = |y| at(x0, y, c) * (1.0 - fx) + at(x1, y, c) * fx;
+        row(y0) * (1.0 - fy) + row(y1) * fy
+    })
+}
