@@ -59,14 +59,16 @@ mod tests {
     #[test]
     fn a_double_exponential_rule_takes_any_end_and_any_scale() {
         // ∫ e^-x x^(p-1) dx = Gamma(p).
-        let gamma = |p: f64, scale| double_exponential(scale, 50.0).map(|(x, w)| w * (-x).exp() * x.powf(p - 1.0)).sum();
+        let gamma =
+            |p: f64, scale| double_exponential(scale, 50.0).map(|(x, w)| w * (-x).exp() * x.powf(p - 1.0)).sum();
         let check = |found: f64, exact: f64| assert!((found / exact - 1.0).abs() < 1e-11, "{found} {exact}");
         check(gamma(1.0, 1.0), 1.0);
         check(gamma(1.5, 1.0), 0.5 * std::f64::consts::PI.sqrt());
         check(gamma(4.0, 0.1), 6.0);
         // ∫ s/(s² + x²) dx over all is pi/2, and over what lies beyond `end` s/end.
         for scale in [1e-12f64, 1e-3, 1.0] {
-            let sum: f64 = double_exponential(scale, 1e13 * scale).map(|(x, w)| w * scale / (x * x + scale * scale)).sum();
+            let sum: f64 =
+                double_exponential(scale, 1e13 * scale).map(|(x, w)| w * scale / (x * x + scale * scale)).sum();
             check(sum, 0.5 * std::f64::consts::PI);
         }
         assert!(double_exponential(1.0, 50.0).count() < 40);

@@ -16,7 +16,10 @@ pub(super) struct NormalizedDiffusion {
 
 impl NormalizedDiffusion {
     pub fn new(ratios: Ratios, eta: f64) -> NormalizedDiffusion {
-        NormalizedDiffusion::of_albedo(HalfSpace::new(eta).albedo_normal(ratios.coalbedo))
+        let albedo = HalfSpace::new(eta).albedo_normal(ratios.coalbedo);
+        // Where hardly anything scatters the albedo is proportional to alpha', of which the co-albedo has lost bits.
+        let seen = 1.0 - ratios.coalbedo;
+        NormalizedDiffusion::of_albedo(if seen == 0.0 { 0.0 } else { albedo * (ratios.alpha / seen) })
     }
 
     /// Of the surface albedo A.
