@@ -206,7 +206,7 @@ fn a_profile_is_told_for_coefficients_for_a_medium_and_for_a_file() {
         }
         assert!((number(&facts["albedo"]) - albedo).abs() < 2e-6, "{facts}");
     }
-    run(&[]).ok().says(&["ior 1.33, PhotonBeamDiffusion", "R_d [1/mm²]", "7.354802984e-6", "albedo"]);
+    run(&[]).ok().says(&["ior 1.33, PhotonBeamDiffusion", "R_d [1/mm²]", "7.3548029841e-6", "albedo"]);
     assert_eq!(run(&["--g", "-0.5"]).status, 0);
     // At 0 some are infinite, which JSON does not know.
     let facts = desk.run(&[&coefficients[..], &["--radius", "0", "--json"]].concat()).ok().json();

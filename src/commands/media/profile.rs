@@ -90,7 +90,8 @@ fn table(name: &str, model: Model, ior: f64, profiles: &[Profile], radii: &[f64]
         [one] => finite(*one),
         several => several.iter().map(|v| finite(*v)).collect::<Value>(),
     };
-    let mut text = format!("{name}, ior {ior}, {model:?}\n{:>12}  R_d [1/mm²]\n", "r [mm]");
+    let channels = if profiles.len() == 3 { "  R  G  B" } else { "" };
+    let mut text = format!("{name}, ior {ior}, {model:?}\n{:>12}  R_d [1/mm²]{channels}\n", "r [mm]");
     let mut values = Vec::new();
     for r in radii {
         let r_d = each(&|profile| profile.r_d(*r));

@@ -2,7 +2,7 @@
 //! single scattering without approximation. The unit of length is 1/sigma_t', but for single scattering 1/sigma_t.
 //!
 //! R_MS(r) = ∫ e^-z kappa exitance(r, z) dz, with kappa = 1 - e^(-2 (d_r + z)) for sources so near that no light from them
-//! could have diffused [Habel2013, eq. 9].
+//! could have diffused [Habel2013].
 //!
 //! R_SS(r) = rho ∫ e^(-t - d)/d² p(mu) (1 - F(mu)) mu dt, over the depths t from which the boundary lets light out:
 //! t above t_c = r sqrt(eta² - 1), with d = sqrt(r² + t²), mu = t/d, and p for directions that both point away from

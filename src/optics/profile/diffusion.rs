@@ -9,7 +9,7 @@
 //! E   = (z (1 + s d_r) e^(-s d_r)/d_r³ + (z + 2 z_b) (1 + s d_v) e^(-s d_v)/d_v³) / (4 pi)
 //! ```
 //!
-//! are fluence and flux, s the effective transport coefficient. What leaves is gain · (c_phi phi + c_E E) [dEon2011, eq. 9;
+//! are fluence and flux, s the effective transport coefficient. What leaves is gain · (c_phi phi + c_E E) [dEon2011;
 //! dEon2012]. [Jensen2001] counts E alone.
 
 use super::Ratios;
