@@ -134,6 +134,15 @@ impl Profile {
         self.single(r) + self.multiple(r)
     }
 
+    /// R_d from the table of [`Profile::sample`], for whoever asks millions of times: photon beams take 0.1 µs instead of 9.
+    /// Off by less than 1e-4 of R_d within the radius that holds all but a millionth of the light.
+    pub fn r_d_tabulated(&self, r: f64) -> f64 {
+        match self.radii().and_then(|radii| radii.value(r * self.sigma_t_prime)) {
+            Some(value) => self.per_mm2(value),
+            None => self.r_d(r),
+        }
+    }
+
     /// The part of R_d that light makes which was scattered once, where the model tells it apart; else 0.
     pub fn single(&self, r: f64) -> f64 {
         match &self.shape {
@@ -171,7 +180,7 @@ impl Profile {
 
     /// A radius, mm, for `u` in [0, 1), with the density [`Profile::pdf`]: nearly proportional to R_d, and never 0 where
     /// R_d is not, so that R_d / pdf is bounded and an estimate by it has no bias. The same u gives growing radii.
-    /// `None` when no light returns. The table behind it is made at the first call, in about a millisecond.
+    /// `None` when no light returns. The table behind it is made at the first call: about 4 ms for photon beams, 50 µs for others.
     pub fn sample(&self, u: f64) -> Option<f64> {
         self.radii().map(|radii| radii.sample(u) / self.sigma_t_prime)
     }

@@ -19,8 +19,8 @@ pub(super) struct Radii {
 
 /// The optical radius of the first knot. Profiles go as 1/x below it.
 const FIRST: f64 = 1e-7;
-/// ln of the ratio of two neighbours: 16 knots per decade.
-const STEP: f64 = std::f64::consts::LN_10 / 16.0;
+/// ln of the ratio of two neighbours: 24 knots per decade.
+const STEP: f64 = std::f64::consts::LN_10 / 24.0;
 /// The table ends when the share beyond it is below this.
 const BEYOND: f64 = 1e-10;
 
@@ -108,6 +108,22 @@ impl Radii {
             }
         };
         below / self.total
+    }
+
+    /// The profile itself at `x`, by a cubic through the logarithms at four knots; `None` beyond the table.
+    pub fn value(&self, x: f64) -> Option<f64> {
+        let steps = (x / FIRST).ln() / STEP;
+        // The four knots around x: one more on either side of the two that it lies between.
+        let first = (steps - 1.0).floor();
+        if !(first >= 0.0 && first + 3.0 < self.density.len() as f64) {
+            return None;
+        }
+        let knot = first as usize;
+        let [a, b, c, d]: [f64; 4] = std::array::from_fn(|i| self.density[knot + i].ln());
+        let t = steps - first;
+        let (u, v, w) = (t - 1.0, t - 2.0, t - 3.0);
+        let log = (d * t * u * v - a * u * v * w) / 6.0 + (b * t * v * w - c * t * u * w) / 2.0;
+        Some(log.exp() / (2.0 * PI * x))
     }
 
     fn place(&self, x: f64) -> Place {

@@ -202,6 +202,15 @@ fn radii_are_drawn_in_proportion_and_none_is_left_out() {
                 let weight = profile.r_d(r) / profile.pdf(r);
                 assert!((0.0..1.1 * albedo).contains(&weight), "{model:?} {alpha} at {r}: {weight} of {albedo}");
             }
+            let worst = (0..2000).map(|i| {
+                let r = profile.sample(1.0 - 10f64.powf(-6.0 * f64::from(i) / 2000.0)).unwrap();
+                if r == 0.0 { 0.0 } else { (profile.r_d_tabulated(r) / profile.r_d(r) - 1.0).abs() }
+            });
+            let worst = worst.fold(0.0, f64::max);
+            assert!(worst < 1e-4, "{model:?} {alpha}: {worst}");
+            for r in [0.0, 1e-9, 1e30] {
+                assert_eq!(profile.r_d_tabulated(r), profile.r_d(r));
+            }
             assert_eq!(profile.sample(0.0), Some(0.0));
             assert!(profile.sample(1.0 - f64::EPSILON / 2.0).unwrap() > 20.0 * profile.sample(0.5).unwrap());
         }
