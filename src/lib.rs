@@ -35,7 +35,7 @@
 //! | [`problem`] | the only error that a user sees: where, what, what to do | |
 //! | [`image`] | linear images; EXR, PNG, HDR, JPEG in, EXR and PNG out; tone curves | |
 //! | [`papers`] | the bibliography; comments cite its keys | |
-//! | [`optics`] | media, Fresnel, gloss, phase functions, albedo of a half space: scalar f64, mm | |
+//! | [`optics`] | media, Fresnel, gloss, phase functions, profiles, albedo of a half space: scalar f64, mm | |
 //! | [`geometry`] | meshes, shapes, sculptures, rays, filters on vertices | |
 //! | [`store`] | the one mechanism: keys, plans, memory, disk, the door for files | its key is new |
 //! | [`scene`] | RON into a valid [`scene::Scene`]; the only room that knows RON | a file's content changes |

@@ -14,6 +14,10 @@ pub const PAPERS: &[Paper] = &[
     paper("Botsch2004", "M. Botsch & L. Kobbelt. A Remeshing Approach to Multiresolution Modeling. SGP 2004"),
     paper("Chandrasekhar1960", "S. Chandrasekhar. Radiative Transfer. Dover, 1960"),
     paper(
+        "Christensen2015",
+        "P. Christensen & B. Burley. Approximate Reflectance Profiles for Efficient Subsurface Scattering. Pixar TM 15-04, 2015",
+    ),
+    paper(
         "Cigolle2014",
         "Z. Cigolle et al. A Survey of Efficient Representations for Independent Unit Vectors. JCGT 3(2), 2014",
     ),
@@ -21,6 +25,7 @@ pub const PAPERS: &[Paper] = &[
         "dEon2011",
         "E. d'Eon & G. Irving. A Quantized-Diffusion Model for Rendering Translucent Materials. SIGGRAPH 2011",
     ),
+    paper("dEon2012", "E. d'Eon. A Better Dipole. 2012"),
     paper(
         "Doi1991",
         "A. Doi & A. Koide. An Efficient Method of Triangulating Equi-Valued Surfaces by Using Tetrahedral Cells. IEICE E74, 1991",
@@ -31,6 +36,10 @@ pub const PAPERS: &[Paper] = &[
         "G. François, S. Pattanaik, K. Bouatouch & G. Breton. Subsurface Texture Mapping. IRISA PI 1806, 2006",
     ),
     paper("Green2004", "S. Green. Real-Time Approximations to Subsurface Scattering. GPU Gems 1, chapter 16, 2004"),
+    paper(
+        "Habel2013",
+        "R. Habel, P. Christensen & W. Jarosz. Photon Beam Diffusion: A Hybrid Monte Carlo Method for Subsurface Scattering. CGF 32(4), 2013",
+    ),
     paper(
         "Heitz2014",
         "E. Heitz. Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs. JCGT 3(2), 2014",
@@ -53,10 +62,6 @@ pub const PAPERS: &[Paper] = &[
     paper(
         "Ramamoorthi2001",
         "R. Ramamoorthi & P. Hanrahan. An Efficient Representation for Irradiance Environment Maps. SIGGRAPH 2001",
-    ),
-    paper(
-        "Thurmer1998",
-        "G. Thürmer & C. Wüthrich. Computing Vertex Normals from Polygonal Facets. Journal of Graphics Tools 3(1), 1998",
     ),
     paper(
         "Tomaszewska2012",

@@ -34,7 +34,6 @@ const LATER: [(&str, &str); 5] = [
     ("preview", "`diaphane render SCENE -o OUT.png` makes a picture"),
     ("compare", "`diaphane render SCENE -o OUT.exr` writes linear light, for other programs to compare"),
     ("bench", "`diaphane render SCENE -o OUT.png --timings` says what each step took"),
-    ("profile", "`diaphane media show NAME` prints what follows from a medium"),
 ];
 
 /// Whether words that cannot be read ask for JSON.

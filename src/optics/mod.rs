@@ -12,8 +12,9 @@
 //! | [`fresnel`] | reflectance of a dielectric boundary and its moments |
 //! | [`microfacet`] | the glossy lobe of a rough boundary, and how much it reflects in all |
 //! | [`phase`] | where a scattered photon goes |
+//! | [`profile`] | how far from where it entered light leaves: dipoles, photon beams, normalised diffusion |
 //! | [`sh`] | real spherical harmonics and what convolution does to them |
-//! | [`quadrature`] | Gauss-Legendre rules, plain and graded towards a singular end |
+//! | [`quadrature`] | Gauss-Legendre rules, plain and graded towards a singular end, and a double exponential one |
 
 pub mod fresnel;
 pub mod half_space;
@@ -21,6 +22,7 @@ pub mod medium;
 pub mod microfacet;
 pub mod phase;
 pub mod presets;
+pub mod profile;
 pub mod quadrature;
 mod root;
 pub mod sh;

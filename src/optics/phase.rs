@@ -27,6 +27,15 @@ impl Phase {
         }
     }
 
+    /// A cosine for `u` in [0, 1] with the density 2 pi [`Phase::value`], growing with u. It is that of this module: light
+    /// that travelled along omega goes on at the cosine -`sample` to omega.
+    pub fn sample(self, u: f64, parameter: f64) -> f64 {
+        match self {
+            Phase::HenyeyGreenstein => sample_henyey_greenstein(u, parameter),
+            Phase::Schlick => sample_schlick(u, parameter),
+        }
+    }
+
     /// The mean cosine g between the directions in which light travels before and after.
     pub fn mean_cosine(self, parameter: f64) -> f64 {
         match self {
@@ -53,6 +62,26 @@ pub fn isotropic() -> f64 {
 pub fn henyey_greenstein(cos: f64, g: f64) -> f64 {
     let q = 1.0 + g * g + 2.0 * g * cos;
     0.25 / PI * (1.0 - g * g) / (q * q.sqrt())
+}
+
+/// The cosine below which the share `u` of [`henyey_greenstein`] lies: the textbook's inverse, multiplied out so that
+/// g = 0 is no special case and the result never leaves [-1, 1].
+pub fn sample_henyey_greenstein(u: f64, g: f64) -> f64 {
+    let q = 1.0 + g - 2.0 * g * u;
+    let above = 2.0 * u * ((1.0 - g) / q) * ((1.0 - g) / q) * (1.0 + g * (1.0 - u));
+    let below = 2.0 * (1.0 - u) * ((1.0 + g) / q) * ((1.0 + g) / q) * (1.0 - g * u);
+    between(above, below)
+}
+
+/// The cosine below which the share `u` of [`schlick`] lies.
+pub fn sample_schlick(u: f64, k: f64) -> f64 {
+    let q = 1.0 + k - 2.0 * k * u;
+    between(2.0 * u * (1.0 - k) / q, 2.0 * (1.0 - u) * (1.0 + k) / q)
+}
+
+/// The cosine c for 1 + c and 1 - c, from the one that has more bits.
+fn between(above: f64, below: f64) -> f64 {
+    if above < below { above - 1.0 } else { 1.0 - below }
 }
 
 /// Schlick's function for `k` in (-1, 1), as [Francois2006] prints it. k is not the mean cosine.
@@ -111,7 +140,69 @@ mod tests {
         assert_eq!((henyey_greenstein(0.3, 0.0), schlick(0.3, 0.0)), (isotropic(), isotropic()));
     }
 
+    /// (chi² - degrees of freedom) / sqrt(2 · degrees of freedom), which is about normal, of `draws` cosines from `sample`
+    /// against the shares of bins whose edges are given.
+    fn chi_square(draws: u32, edges: &[f64], share: impl Fn(f64, f64) -> f64, sample: impl Fn(f64) -> f64) -> f64 {
+        use rand_pcg::rand_core::Rng;
+        let mut random = rand_pcg::Pcg64Mcg::new(11);
+        let mut counts = vec![0u32; edges.len() - 1];
+        for _ in 0..draws {
+            let cos = sample((random.next_u64() >> 11) as f64 * 2f64.powi(-53));
+            counts[edges[1..edges.len() - 1].partition_point(|edge| *edge <= cos)] += 1;
+        }
+        let chi2: f64 = edges
+            .windows(2)
+            .zip(counts)
+            .map(|(edge, count)| {
+                let expected = f64::from(draws) * share(edge[0], edge[1]);
+                (f64::from(count) - expected).powi(2) / expected
+            })
+            .sum();
+        let freedom = (edges.len() - 2) as f64;
+        (chi2 - freedom) / (2.0 * freedom).sqrt()
+    }
+
+    #[test]
+    fn samples_have_the_density_and_a_wrong_density_is_noticed() {
+        for phase in [Phase::HenyeyGreenstein, Phase::Schlick] {
+            for parameter in [-0.99, -0.6, 0.0, 0.25, 0.8, 0.99] {
+                // Bins that hold about equal shares of the true density, whatever `sample` does.
+                let rule = gauss_legendre(40, 0.0, 1.0);
+                let share = |parameter: f64| {
+                    move |a: f64, b: f64| {
+                        2.0 * PI * (b - a) * integrate(&rule, |t| phase.value(a + (b - a) * t, parameter))
+                    }
+                };
+                let edges: Vec<f64> = (0..=64).map(|i| phase.sample(f64::from(i) / 64.0, parameter)).collect();
+                let right = chi_square(100_000, &edges, share.clone()(parameter), |u| phase.sample(u, parameter));
+                assert!(right.abs() < 5.0, "{phase:?} {parameter}: {right}");
+                let wrong = chi_square(100_000, &edges, share(parameter), |u| phase.sample(u, 0.9 * parameter - 0.05));
+                assert!(wrong > 5.0, "{phase:?} {parameter}: {wrong}");
+            }
+        }
+    }
+
     proptest! {
+        #[test]
+        fn a_sample_is_the_inverse_of_what_lies_below(u in 0.0..=1.0f64, parameter in -0.99..=0.99f64) {
+            for phase in [Phase::HenyeyGreenstein, Phase::Schlick] {
+                prop_assert_eq!((phase.sample(0.0, parameter), phase.sample(1.0, parameter)), (-1.0, 1.0));
+                prop_assert!((phase.sample(u, 0.0) - (2.0 * u - 1.0)).abs() <= f64::EPSILON);
+                let cos = phase.sample(u, parameter);
+                prop_assert!((-1.0..=1.0).contains(&cos) && phase.value(cos, parameter).is_finite());
+                // The antiderivatives of the test above, from -1.
+                let below = match phase {
+                    Phase::HenyeyGreenstein => {
+                        let (g, root) = (parameter, (1.0 + parameter * parameter + 2.0 * parameter * cos).sqrt());
+                        // (1 - g²)/2g (1/(1 - g) - 1/root), without dividing by g.
+                        (1.0 + g) * (1.0 + cos) / (root * (root + 1.0 - g))
+                    }
+                    Phase::Schlick => 0.5 * (1.0 + parameter) * (1.0 + cos) / (1.0 + parameter * cos),
+                };
+                prop_assert!((below - u).abs() < 1e-11, "{phase:?} {below}");
+            }
+        }
+
         #[test]
         fn normal_forward_and_of_the_stated_mean_cosine(parameter in -0.9..0.9f64) {
             let rule = gauss_legendre(200, -1.0, 1.0);

@@ -1,4 +1,4 @@
-//! Gauss-Legendre rules as lists of (node, weight).
+//! Rules of quadrature as lists of (node, weight): Gauss-Legendre on an interval, double exponential on the half line.
 
 use gauss_quad::legendre::GaussLegendre;
 use std::num::NonZeroUsize;
@@ -15,6 +15,25 @@ pub fn gauss_legendre(n: usize, a: f64, b: f64) -> Vec<(f64, f64)> {
 pub fn graded(n: usize, a: f64, b: f64) -> Vec<(f64, f64)> {
     gauss_legendre(n, 0.0, 1.0).into_iter().map(|(s, w)| (a + (b - a) * s.powi(3), 3.0 * (b - a) * s * s * w)).collect()
 }
+
+/// A rule on [0, ∞) for integrands that fall to nothing by `end`, whatever they do at 0 (a root, a logarithm, no end of
+/// derivatives), and however many decades lie between `end` and `scale`, the length of their finest detail: the
+/// trapezoidal rule after x = scale exp(u - e^-u) [Takahasi1974]. Nodes are even in ln x, five to a factor of e, so what
+/// matters is where the integrand is singular in ln x: up to 1 away from the real axis, as for x = ±i scale, it is good
+/// to about 1e-13 of the whole.
+pub fn double_exponential(scale: f64, end: f64) -> impl Iterator<Item = (f64, f64)> {
+    // What lies below the first node, x/scale = 1e-15, is left out.
+    let nodes = (FIRST..).map(move |i| {
+        let u = STEP * f64::from(i);
+        let (x, slope) = (scale * (u - (-u).exp()).exp(), 1.0 + (-u).exp());
+        (x, STEP * x * slope)
+    });
+    nodes.take_while(move |(x, _)| *x < end)
+}
+
+/// Of u, in [`double_exponential`].
+const STEP: f64 = 0.2;
+const FIRST: i32 = -17;
 
 /// The sum that `rule` makes of `f`.
 pub fn integrate(rule: &[(f64, f64)], f: impl Fn(f64) -> f64) -> f64 {
@@ -35,6 +54,24 @@ mod tests {
             assert!(moment(n, p).abs() < 1e-14 * scale, "{n}");
         }
         assert!(moment(4, 8).abs() > 1e-3);
+    }
+
+    #[test]
+    fn a_double_exponential_rule_takes_any_end_and_any_scale() {
+        // ∫ e^-x x^(p-1) dx = Gamma(p).
+        let gamma =
+            |p: f64, scale| double_exponential(scale, 50.0).map(|(x, w)| w * (-x).exp() * x.powf(p - 1.0)).sum();
+        let check = |found: f64, exact: f64| assert!((found / exact - 1.0).abs() < 1e-11, "{found} {exact}");
+        check(gamma(1.0, 1.0), 1.0);
+        check(gamma(1.5, 1.0), 0.5 * std::f64::consts::PI.sqrt());
+        check(gamma(4.0, 0.1), 6.0);
+        // ∫ s/(s² + x²) dx over all is pi/2, and over what lies beyond `end` s/end.
+        for scale in [1e-12f64, 1e-3, 1.0] {
+            let sum: f64 =
+                double_exponential(scale, 1e13 * scale).map(|(x, w)| w * scale / (x * x + scale * scale)).sum();
+            check(sum, 0.5 * std::f64::consts::PI);
+        }
+        assert!(double_exponential(1.0, 50.0).count() < 40);
     }
 
     #[test]

@@ -3,9 +3,10 @@
 use crate::optics::Rgb;
 use crate::optics::medium::Medium;
 use crate::optics::phase::Phase;
+use crate::optics::profile::Model;
 use crate::problem::Problem;
 use crate::scene::fields::{Spec, TextureSpec, Triple};
-use crate::scene::material_file::{Curve, Filter, LayerSpec, MaterialFile, Profile};
+use crate::scene::material_file::{Curve, Filter, LayerSpec, MaterialFile};
 use crate::scene::meaning::Judge;
 use crate::scene::medium::{MediumSpec, Substance};
 use crate::scene::outside::{Channel, Encoding, Texture};
@@ -29,7 +30,7 @@ pub struct Material {
     /// How the file spelled the medium.
     pub spelled: MediumSpec,
     pub phase: Phase,
-    pub profile: Profile,
+    pub profile: Model,
     pub filter: Filter,
     /// From the outside inwards; below the last lies `medium`.
     pub layers: Vec<Layer>,

@@ -1,6 +1,7 @@
 //! The schema of a material file, with its defaults. Lengths are millimetres, coefficients 1/mm.
 
 use crate::optics::phase::Phase;
+use crate::optics::profile::Model;
 use crate::scene::fields::{Spec, Triple};
 use crate::scene::medium::MediumSpec;
 use serde::{Deserialize, Serialize};
@@ -15,7 +16,7 @@ pub struct MaterialFile {
     pub medium: MediumSpec,
     /// The medium's own when it is left out.
     pub phase: Option<Phase>,
-    pub profile: Profile,
+    pub profile: Model,
     pub filter: Filter,
     pub layers: Vec<LayerSpec>,
 }
@@ -28,7 +29,7 @@ impl Default for MaterialFile {
             surface: SurfaceSpec::default(),
             medium: MediumSpec::Preset("marble".to_string()),
             phase: None,
-            profile: Profile::default(),
+            profile: Model::default(),
             filter: Filter::default(),
             layers: Vec::new(),
         }
@@ -66,16 +67,6 @@ impl Default for LayerSpec {
         let medium = MediumSpec::Preset("marble".to_string());
         LayerSpec { name: None, medium, phase: None, depth: Spec::Constant(1.0) }
     }
-}
-
-/// How far light that entered at one point leaves at others.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum Profile {
-    #[default]
-    PhotonBeamDiffusion,
-    Dipole,
-    BetterDipole,
-    NormalizedDiffusion,
 }
 
 /// Whether a filtered normal keeps its length, and so dims as diffusion does, or is made unit again [Patro2007].

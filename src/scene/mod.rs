@@ -32,8 +32,7 @@ pub use document::Kind;
 pub use fields::Triple;
 pub use material::{Layer, Material, Surface, TextureMap, Varying};
 pub use material_file::{
-    BoxKernel, Curve, Diffusion, Exponential, Filter, FromMedium, Gaussian, Length, Neighbours, Normalized, Profile,
-    Weights,
+    BoxKernel, Curve, Diffusion, Exponential, Filter, FromMedium, Gaussian, Length, Neighbours, Normalized, Weights,
 };
 pub use medium::{MediumSpec, Substance};
 pub use outside::{Channel, Encoding, Mesh, Texture, Tone};

@@ -40,7 +40,7 @@ fn every_command_has_help_and_every_flag_of_it_says_what_it_does() {
     let all = desk.run(&["--help"]).ok();
     assert_eq!(all.out, desk.run(&["help"]).ok().out);
     assert_eq!(all.out, desk.run(&[]).ok().out);
-    let nested = ["media list", "media show", "cache stat", "cache clear"];
+    let nested = ["media list", "media show", "media profile", "cache stat", "cache clear"];
     for command in COMMANDS.iter().chain(&nested) {
         let words: Vec<&str> = command.split(' ').collect();
         let help = desk.run(&[&words[..], &["--help"]].concat()).ok();
@@ -122,20 +122,19 @@ fn a_place_in_a_file_reaches_programs() {
 #[test]
 fn words_for_a_later_version_are_told_apart_from_misspelt_ones() {
     let desk = Desk::new();
-    let later: [&[&str]; 6] = [
+    let later: [&[&str]; 5] = [
         &["watch", "scene.ron", "-o", "a.png"],
         &["preview", "scene.ron"],
         &["reference", "merge", "a.exr", "-o", "b.exr"],
         &["compare", "a.png", "b.png"],
         &["bench", "scene.ron"],
-        &["media", "profile", "--g", "0"],
     ];
     for words in later {
         let ran = desk.run(words).fails(2, &["is not in this version"]);
         assert!(ran.err.contains("hint: "), "{ran:#?}");
     }
     desk.run(&["rendr", "scene.ron"]).fails(2, &["'rendr'", "'render'"]);
-    desk.run(&["media"]).fails(2, &["  list  ", "  show  "]);
+    desk.run(&["media"]).fails(2, &["  list  ", "  show  ", "  profile  "]);
     desk.run(&["render", "scene.ron"]).fails(2, &["--output <FILE>"]);
     desk.run(&["check"]).fails(2, &["<FILE>"]);
     desk.run(&["explain", "scene.ron", "--part", "shiny"]).fails(2, &["shiny", "glossy"]);
@@ -174,9 +173,79 @@ fn media_are_listed_and_every_quantity_of_one_is_told() {
     let facts = desk.run(&["media", "show", "marble", "--scene", "scene.ron", "--json"]).ok().json();
     let distance = facts["scattering distance 1/sigma_tr [mm]"][0].as_f64().unwrap();
     assert!((facts["scene"]["units"][0].as_f64().unwrap() - distance / 10.0).abs() < 1e-12);
+    // Every length and coefficient, not the scattering distance alone.
+    let path = &facts["scene"]["quantities"]["mean free path"];
+    assert!((path["units"][0].as_f64().unwrap() - 1.0 / 21.921).abs() < 1e-12);
+    let share = path["share_of_object"]["ball"][0].as_f64().unwrap() / path["pixels"][0].as_f64().unwrap();
+    let other = &facts["scene"];
+    let same = other["share_of_object"]["ball"][0].as_f64().unwrap() / other["pixels"][0].as_f64().unwrap();
+    assert!((share / same - 1.0).abs() < 1e-12);
+    assert!((facts["scene"]["quantities"]["sigma_a"]["per_unit"][0].as_f64().unwrap() - 0.021).abs() < 1e-12);
+    desk.run(&["media", "show", "fish organs"]).ok().says(&["phase Schlick", "k of the phase function"]);
     desk.run(&["media", "show", "marbel"]).fails(2, &["`marbel`", "did you mean `marble`?"]);
     desk.run(&["media", "show", "scene.ron"]).fails(1, &["scene.ron:1:1", "Material( )"]);
     desk.run(&["media", "show", "marble", "--scene", "stone.ron"]).fails(1, &["stone.ron:1:1", "Scene( )"]);
+}
+
+#[test]
+fn a_profile_is_told_for_coefficients_for_a_medium_and_for_a_file() {
+    let desk = Desk::new();
+    let coefficients = ["media", "profile", "--sigma-a", "0.1", "--sigma-s", "0.9", "--ior", "1.33"];
+    let radii = ["--radius", "0.1,1,10"];
+    let run = |more: &[&str]| desk.run(&[&coefficients[..], more, &radii].concat());
+    let number = |value: &Value| value.as_f64().unwrap();
+    for (model, golden, albedo) in [
+        ("PhotonBeamDiffusion", [0.1055553 + 0.2612586, 0.01266397 + 0.001103233, 7.354803e-6], 0.2958),
+        ("Dipole", [0.06395592, 0.02149017, 5.998901e-6], 0.294128),
+        ("BetterDipole", [0.03277093, 0.01406736, 7.863486e-6], 0.233951),
+    ] {
+        let facts = run(&["--g", "0", "--model", model, "--json"]).ok().json();
+        assert_eq!(facts["radius_mm"], serde_json::json!([0.1, 1.0, 10.0]));
+        for (value, golden) in facts["r_d"].as_array().unwrap().iter().zip(golden) {
+            assert!((number(value) / golden - 1.0).abs() < 5e-7, "{model}: {value} {golden}");
+        }
+        assert!((number(&facts["albedo"]) - albedo).abs() < 2e-6, "{facts}");
+    }
+    run(&[]).ok().says(&["ior 1.33, PhotonBeamDiffusion", "R_d [1/mm²]", "7.3548029841e-6", "albedo"]);
+    assert_eq!(run(&["--g", "-0.5"]).status, 0);
+    // At 0 some are infinite, which JSON does not know.
+    let facts = desk.run(&[&coefficients[..], &["--radius", "0", "--json"]].concat()).ok().json();
+    assert!(facts["r_d"][0].is_null());
+
+    // A medium has three channels; a file its own model and index.
+    let marble = desk.run(&["media", "profile", "marble", "--radius", "1", "--json"]).ok().json();
+    let red = desk.run(&[
+        "media",
+        "profile",
+        "--sigma-a",
+        "0.0021",
+        "--sigma-s",
+        "2.19",
+        "--ior",
+        "1.5",
+        "--radius",
+        "1",
+        "--json",
+    ]);
+    assert_eq!(marble["r_d"][0][0], red.ok().json()["r_d"][0]);
+    desk.write("wax.ron", "Material(version: 1, medium: Preset(\"marble\"), surface: (ior: 1.2), profile: Dipole)");
+    let wax = desk.run(&["media", "profile", "wax.ron", "--radius", "1,2", "--json"]).ok().json();
+    assert_eq!((wax["model"].as_str(), wax["ior"].as_f64()), (Some("Dipole"), Some(1.2)));
+    assert_eq!(wax["r_d"][1].as_array().unwrap().len(), 3);
+
+    for (words, said) in [
+        (&["--model", "Dipol"][..], "did you mean Dipole?"),
+        (&["--model", "7"], "there is PhotonBeamDiffusion"),
+        (&["--g", "1"], "between -1 and 1"),
+        (&["--ior", "0.9"], "from 1"),
+    ] {
+        let ran = desk.run(&[&coefficients[..6], words, &radii].concat()).fails(2, &[said]);
+        assert!(ran.out.is_empty());
+    }
+    desk.run(&["media", "profile", "--sigma-a", "0.1", "--radius", "1"]).fails(2, &["--sigma-s <S>"]);
+    desk.run(&["media", "profile", "--sigma-a", "nan", "--sigma-s", "1", "--radius", "1"]).fails(2, &["0 or more"]);
+    desk.run(&["media", "profile", "marble", "--sigma-a", "1", "--radius", "1"]).fails(2, &["cannot be used with"]);
+    desk.run(&["media", "profile", "marbel", "--radius", "1"]).fails(2, &["did you mean `marble`?"]);
 }
 
 #[test]
