@@ -75,7 +75,7 @@ impl Desk {
 fn both(test: fn(&mut Desk)) {
     for polls in [false, true] {
         let (wake, woken) = channel();
-        let wake = move || drop(wake.send(()));
+        let wake = move || _ = wake.send(());
         let mut follow = if polls { Follow::polling(wake) } else { Follow::new(wake) };
         if polls {
             start_polling(Arc::downgrade(&follow.shared));
@@ -137,32 +137,28 @@ fn touches_reads_and_other_files_are_no_change() {
     });
 }
 
+/// Whoever looks because a file was read, and reads it for that, never ends.
 #[test]
-fn reading_wakes_nobody() {
-    let (wake, woken) = channel();
-    let mut follow = Follow::new(move || drop(wake.send(())));
-    let folder = tempfile::tempdir().unwrap();
-    let [a, b] = ["a", "b"].map(|name| folder.path().join(name));
-    fs::write(&a, "one").unwrap();
-    fs::write(&b, "one").unwrap();
-    let files = Files::default();
-    (0..2).for_each(|_| drop(files.read(&a)));
-    files.read(&b).unwrap();
-    follow.depend_on(&files);
-    let quiet = || {
-        // What was written just before the watch began may still be told of.
-        while woken.recv_timeout(5 * GATHER).is_ok() {}
-    };
-    quiet();
-    follow.changed();
-    (0..3).for_each(|_| drop(fs::read(&a).unwrap()));
-    fs::write(folder.path().join("picture.png"), "own").unwrap();
-    fs::write(&b, "two").unwrap();
-    woken.recv_timeout(DEADLINE).expect("an edit wakes");
-    assert_eq!(follow.changed(), [b]);
-    quiet();
-    assert_eq!(follow.changed().len(), 1);
-    assert!(woken.recv_timeout(10 * GATHER).is_err(), "to look at files is no reason to look at files");
+fn reading_wakes_nobody_nor_do_strangers() {
+    use notify::event::{AccessKind, AccessMode, CreateKind, DataChange, Flag, RemoveKind};
+    let trail = Trail::to([PathBuf::from("/there/is/none")].iter());
+    let event = |kind, path: &str| DebouncedEvent::new(notify::Event::new(kind).add_path(path.into()), Instant::now());
+    let modified = EventKind::Modify(ModifyKind::Data(DataChange::Any));
+    let written = EventKind::Access(AccessKind::Close(AccessMode::Write));
+    for kind in [modified, written, EventKind::Create(CreateKind::Any), EventKind::Remove(RemoveKind::Any)] {
+        assert!(trail.is_met_by(&event(kind, "/there")) && trail.is_met_by(&event(kind, "/THERE")), "{kind:?}");
+        assert!(!trail.is_met_by(&event(kind, "/picture.png")), "{kind:?}");
+    }
+    for mode in [AccessMode::Any, AccessMode::Read] {
+        for kind in [AccessKind::Open(mode), AccessKind::Close(mode), AccessKind::Read] {
+            assert!(!trail.is_met_by(&event(EventKind::Access(kind), "/there")), "{kind:?}");
+        }
+    }
+    let missed = notify::Event::new(EventKind::Other).set_flag(Flag::Rescan);
+    let missed = DebouncedEvent::new(missed, Instant::now());
+    assert!(trail.is_met_by(&missed) && trail.is_moved_by(&missed));
+    assert!(trail.is_moved_by(&event(EventKind::Remove(RemoveKind::Folder), "/")));
+    assert!(!trail.is_moved_by(&event(modified, "/")));
 }
 
 #[test]
@@ -289,7 +285,7 @@ fn the_way_to_a_file_is_that_of_the_system() {
 #[test]
 fn a_watch_that_cannot_be_had_is_told_once_and_the_files_are_looked_at() {
     let (wake, woken) = channel();
-    let mut follow = Follow::new(move || drop(wake.send(())));
+    let mut follow = Follow::new(move || _ = wake.send(()));
     follow.poll(&notify::Error::new(notify::ErrorKind::MaxFilesWatch));
     let warning = follow.warning().expect("it is told").to_string();
     assert!(warning.starts_with("warning: ") && warning.contains("twice a second"), "{warning}");
