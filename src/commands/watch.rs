@@ -42,8 +42,8 @@ pub struct Watch {
 enum Call {
     /// Something may have changed.
     Look,
-    /// The user has seen enough.
-    Interrupted,
+    /// The user has seen enough, and `interrupted` says so.
+    Stop,
     /// There is nothing more to give up.
     Made,
 }
@@ -96,7 +96,7 @@ impl Watch {
         when_interrupted(move || {
             told.store(true, Ordering::SeqCst);
             cancel.cancel();
-            stop.send(Call::Interrupted).ok(); // unless this is just ending
+            stop.send(Call::Stop).ok(); // unless this is just ending
         });
         let (changed, warned) = Default::default();
         let words = self;
@@ -120,6 +120,10 @@ impl Watching {
                 self.talk(&format!("following {}; Ctrl-C ends it", counted(self.session.files.asked().len(), "file")));
             }
             loop {
+                // Who listened while the picture was made may have heard it already.
+                if self.interrupted.load(Ordering::SeqCst) {
+                    return Ok(Answer::default());
+                }
                 self.changed.extend(self.follow.changed());
                 if let Some(warning) = self.follow.warning() {
                     self.talk(&warning.to_string());
@@ -127,10 +131,7 @@ impl Watching {
                 if !self.changed.is_empty() {
                     break;
                 }
-                match self.calls.recv().expect("this holds a caller itself") {
-                    Call::Interrupted => return Ok(Answer::default()),
-                    Call::Look | Call::Made => {}
-                }
+                self.calls.recv().expect("this holds a caller itself");
             }
         }
     }
@@ -147,10 +148,7 @@ impl Watching {
                 let (image, overtaken) = self.make(&wanted, &progress);
                 match image {
                     Err(_) if self.interrupted.load(Ordering::SeqCst) => return Ok(Attempt::Interrupted),
-                    Err(_) if overtaken => {
-                        self.changed.extend(self.follow.changed());
-                        return Ok(Attempt::Overtaken);
-                    }
+                    Err(_) if overtaken => return Ok(self.overtaken()),
                     Err(problem) => problem.into(),
                     Ok(image) => {
                         match write_picture(&self.words.output, self.format, &wanted.scene, &wanted.look, &image) {
@@ -162,12 +160,21 @@ impl Watching {
             }
             Err(problems) => problems,
         };
+        // A file that was read while it was being written is no mistake by now.
+        if !self.follow.changed().is_empty() {
+            return Ok(self.overtaken());
+        }
         let problems = blame(problems);
         // Words stay wrong whatever the files hold, but for those that name something in them.
         if is_first && problems.cause() == Cause::Words {
             return Err(problems);
         }
         self.broken(&problems)
+    }
+
+    fn overtaken(&mut self) -> Attempt {
+        self.changed.extend(self.follow.changed());
+        Attempt::Overtaken
     }
 
     fn wanted(&self) -> Result<Wanted, Problems> {
