@@ -18,7 +18,7 @@ use diaphane::session::{Options, Session};
 use diaphane::store::{Disk, Finished, Origin, Store, Watch};
 use std::fmt::Write;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, ExitCode};
 use std::sync::Mutex;
 use std::time::{Duration, Instant, SystemTime};
 
@@ -57,7 +57,11 @@ const JADE: &str = r#"Material(
     filter: Neighbours(sigma_tr: 0.6, radius: 2),
 )
 "#;
-const FLOOR: &str = r#"Material(version: 1, medium: Opaque(albedo: Texture(image: "floor.png", encoding: Srgb)))
+const FLOOR: &str = r#"Material(
+    version: 1,
+    surface: (color: Texture(image: "floor.png")),
+    medium: Opaque(albedo: 0.8),
+)
 "#;
 const SHADER: &str = "shaders/frame/compose.wgsl";
 
@@ -254,7 +258,17 @@ fn date(day: u64) -> (u64, u64, u64) {
     (era * 400 + year + u64::from(month <= 2), month, day)
 }
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+fn main() -> ExitCode {
+    match measure() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn measure() -> Result<(), Box<dyn std::error::Error>> {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let value = |flag: &str| words.iter().position(|word| word == flag).and_then(|i| words.get(i + 1));
     let repetitions: u32 = value("--repetitions").map_or(Ok(9), |n| n.parse())?;
