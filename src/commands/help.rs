@@ -29,8 +29,7 @@ Exit status:
 `diaphane help COMMAND` says more of each.";
 
 /// Words that will mean something, and what does something like it by now.
-const LATER: [(&str, &str); 5] = [
-    ("watch", "run `diaphane render` after each edit: what did not change comes from the cache"),
+const LATER: [(&str, &str); 3] = [
     ("preview", "`diaphane render SCENE -o OUT.png` makes a picture"),
     ("compare", "`diaphane render SCENE -o OUT.exr` writes linear light, for other programs to compare"),
     ("bench", "`diaphane render SCENE -o OUT.png --timings` says what each step took"),
