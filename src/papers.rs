@@ -11,6 +11,10 @@ const fn paper(key: &'static str, text: &'static str) -> Paper {
 }
 
 pub const PAPERS: &[Paper] = &[
+    paper(
+        "Andersson2020",
+        "P. Andersson et al. FLIP: A Difference Evaluator for Alternating Images. Proc. ACM CGIT 3(2), 2020",
+    ),
     paper("Chandrasekhar1960", "S. Chandrasekhar. Radiative Transfer. Dover, 1960"),
     paper(
         "Cigolle2014",
@@ -39,6 +43,7 @@ pub const PAPERS: &[Paper] = &[
         "S. Maisch & T. Ropinski. Interactive Subsurface Scattering for Materials With High Scattering Distances. CGF 39(6), 2020",
     ),
     paper("OpenPBR2024", "Academy Software Foundation. OpenPBR Surface 1.1, 2024"),
+    paper("Ottosson2020", "B. Ottosson. A Perceptual Color Space for Image Processing. 2020"),
     paper("Patro2007", "R. Patro. Real-Time Approximate Subsurface Scattering. 2007"),
     paper(
         "Ramamoorthi2001",
@@ -49,4 +54,8 @@ pub const PAPERS: &[Paper] = &[
         "A. Tomaszewska & K. Stefanowski. Real-Time Spherical Harmonics Based Subsurface Scattering. ICIAR 2012",
     ),
     paper("Walter2007", "B. Walter et al. Microfacet Models for Refraction through Rough Surfaces. EGSR 2007"),
+    paper(
+        "Wang2004",
+        "Z. Wang, A. Bovik, H. Sheikh & E. Simoncelli. Image Quality Assessment: From Error Visibility to Structural Similarity. IEEE TIP 13(4), 2004",
+    ),
 ];

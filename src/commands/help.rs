@@ -24,16 +24,16 @@ pub const TEMPLATE: &str = "{about}\n\n{before-help}{usage-heading} {usage}\n\n{
 pub const EXIT: &str = "\
 Exit status:
   0 done   1 the files are wrong   2 the words are wrong   3 there is no adapter
+  4 a comparison is beyond its limit
   5 it could not finish: disk full, device lost, interrupted; what was done is kept
 
 `diaphane help COMMAND` says more of each.";
 
 /// Words that will mean something, and what does something like it by now.
-const LATER: [(&str, &str); 6] = [
+const LATER: [(&str, &str); 5] = [
     ("watch", "run `diaphane render` after each edit: what did not change comes from the cache"),
     ("preview", "`diaphane render SCENE -o OUT.png` makes a picture"),
     ("reference", "`diaphane render SCENE -o OUT.exr` makes a picture by a real-time technique"),
-    ("compare", "`diaphane render SCENE -o OUT.exr` writes linear light, for other programs to compare"),
     ("bench", "`diaphane render SCENE -o OUT.png --timings` says what each step took"),
     ("profile", "`diaphane media show NAME` prints what follows from a medium"),
 ];
