@@ -43,11 +43,12 @@ fn parse_limit(text: &str) -> Result<Limit, String> {
     let wanted = name.trim().to_lowercase();
     let means = |known: &str| known == wanted || known.trim_end_matches("_mean") == wanted.trim_end_matches("_mean");
     let known = MEASURES.map(|(known, _)| known);
-    let measure =
-        MEASURES.into_iter().find(|(known, _)| means(known)).ok_or_else(|| match nearest(&wanted, known) {
+    let measure = MEASURES.into_iter().find(|(known, _)| means(known)).ok_or_else(|| {
+        match nearest(&wanted, known.into_iter().chain(["flip"])) {
             Some(near) => format!("there is no measure `{name}`; did you mean `{near}`?"),
             None => format!("there is no measure `{name}`; there are {}", known.join(", ")),
-        })?;
+        }
+    })?;
     let most: f64 = value.trim().parse().map_err(|_| format!("`{value}` is not a number"))?;
     match most >= 0.0 && most.is_finite() {
         true => Ok(Limit { measure, most }),
