@@ -4,7 +4,7 @@
 //! |---|---|---|---|
 //! | [`relmse`] | squared error over squared radiance: what a renderer gets wrong | linear, unbounded | equal |
 //! | [`dssim`] | (1 - SSIM) / 2: lost or invented structure [Wang2004] | as displayed, cut off at 1 | equal |
-//! | [`flip`] | the difference that an eye sees when it alternates between the two [Andersson2020] | as displayed, 8 bits | no visible difference |
+//! | [`flip`] | what an eye sees that alternates between the two [Andersson2020] | as displayed, 8 bits | no visible difference |
 //! | [`bias`] | signed error of the mean: light that was lost or invented | linear, unbounded | equal energy |
 //! | [`z_test`] | whether what differs can be the reference's own noise | linear, with its standard error | |
 //!

@@ -72,8 +72,8 @@ impl Reader {
         }
     }
 
-    /// An image that nothing names but the user, and what is to be said of its pixels: what is no number is an error. `encoding` is that of
-    /// PNG and JPEG.
+    /// An image that nothing names but the user, and the warnings about its pixels; what is no number is an error.
+    /// `encoding` is that of PNG and JPEG.
     pub fn image(&self, path: &Path, encoding: Encoding) -> Result<(Texture, Vec<Problem>), Problems> {
         let file = document::read(&self.files, path)?;
         let texture = decode(&file.bytes, path, encoding)?;
