@@ -34,6 +34,7 @@
 //! |---|---|---|
 //! | [`problem`] | the only error that a user sees: where, what, what to do | |
 //! | [`image`] | linear images; EXR, PNG, HDR, JPEG in, EXR and PNG out; tone curves | |
+//! | [`metric`] | how far an image is from a reference: relMSE, DSSIM, FLIP, bias, z-test; heat maps | |
 //! | [`papers`] | the bibliography; comments cite its keys | |
 //! | [`optics`] | media, Fresnel, gloss, phase functions, profiles, albedo of a half space: scalar f64, mm | |
 //! | [`geometry`] | meshes, shapes, sculptures, rays, filters on vertices | |
@@ -68,6 +69,7 @@ pub mod frame;
 pub mod geometry;
 pub mod gpu;
 pub mod image;
+pub mod metric;
 pub mod optics;
 pub mod papers;
 pub mod problem;

@@ -11,6 +11,10 @@ const fn paper(key: &'static str, text: &'static str) -> Paper {
 }
 
 pub const PAPERS: &[Paper] = &[
+    paper(
+        "Andersson2020",
+        "P. Andersson et al. FLIP: A Difference Evaluator for Alternating Images. Proc. ACM CGIT 3(2), 2020",
+    ),
     paper("Botsch2004", "M. Botsch & L. Kobbelt. A Remeshing Approach to Multiresolution Modeling. SGP 2004"),
     paper("Chandrasekhar1960", "S. Chandrasekhar. Radiative Transfer. Dover, 1960"),
     paper(
@@ -58,6 +62,7 @@ pub const PAPERS: &[Paper] = &[
     ),
     paper("Meisters1975", "G. H. Meisters. Polygons Have Ears. American Mathematical Monthly 82(6), 1975"),
     paper("OpenPBR2024", "Academy Software Foundation. OpenPBR Surface 1.1, 2024"),
+    paper("Ottosson2020", "B. Ottosson. A Perceptual Color Space for Image Processing. 2020"),
     paper("Patro2007", "R. Patro. Real-Time Approximate Subsurface Scattering. 2007"),
     paper(
         "Ramamoorthi2001",

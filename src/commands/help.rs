@@ -24,14 +24,14 @@ pub const TEMPLATE: &str = "{about}\n\n{before-help}{usage-heading} {usage}\n\n{
 pub const EXIT: &str = "\
 Exit status:
   0 done   1 the files are wrong   2 the words are wrong   3 there is no adapter
+  4 a comparison is beyond its limit
   5 it could not finish: disk full, device lost, interrupted; what was done is kept
 
 `diaphane help COMMAND` says more of each.";
 
 /// Words that will mean something, and what does something like it by now.
-const LATER: [(&str, &str); 3] = [
+const LATER: [(&str, &str); 2] = [
     ("preview", "`diaphane render SCENE -o OUT.png` makes a picture"),
-    ("compare", "`diaphane render SCENE -o OUT.exr` writes linear light, for other programs to compare"),
     ("bench", "`diaphane render SCENE -o OUT.png --timings` says what each step took"),
 ];
 

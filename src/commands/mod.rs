@@ -3,6 +3,7 @@
 mod bake;
 mod cache;
 mod check;
+mod compare;
 mod doctor;
 mod explain;
 mod help;
@@ -64,6 +65,7 @@ enum Command {
     Reference(Box<reference::Reference>),
     Techniques(techniques::Techniques),
     Bake(bake::Bake),
+    Compare(compare::Compare),
     #[command(subcommand)]
     Media(media::Media),
     #[command(subcommand)]
@@ -107,11 +109,13 @@ struct Answer {
     text: String,
     json: Value,
     warnings: Vec<Problem>,
+    /// What was found to be wrong, beside the facts that show it. They decide the status.
+    failures: Vec<Problem>,
 }
 
 impl Answer {
     fn new(text: impl Into<String>, json: Value) -> Answer {
-        Answer { text: text.into(), json, warnings: Vec::new() }
+        Answer { text: text.into(), json, warnings: Vec::new(), failures: Vec::new() }
     }
 
     fn warn(mut self, warnings: impl IntoIterator<Item = Problem>) -> Answer {
@@ -119,10 +123,13 @@ impl Answer {
         self
     }
 
-    /// The warnings among the facts too, for programs that do not read stderr.
+    /// The warnings and failures among the facts too, for programs that do not read stderr.
     fn with_warnings(mut self) -> Answer {
         if let Value::Object(facts) = &mut self.json {
             facts.insert("warnings".into(), self.warnings.iter().map(Problem::json).collect());
+            if !self.failures.is_empty() {
+                facts.insert("problems".into(), self.failures.iter().map(Problem::json).collect());
+            }
         }
         self
     }
@@ -140,7 +147,9 @@ pub fn answer(words: impl IntoIterator<Item = OsString>) -> Said {
         Ok(answer) => {
             // Null: all there was to say was said as it happened.
             let facts = if json && !answer.json.is_null() { pretty(&answer.json) } else { answer.text };
-            Said { facts, talk: Problems(answer.warnings).to_string(), status: 0 }
+            let failures = Problems(answer.failures);
+            let status = if failures.0.is_empty() { 0 } else { failures.cause().exit_status() };
+            Said { facts, talk: Problems([answer.warnings, failures.0].concat()).to_string(), status }
         }
         Err(problems) => Said::wrong(&blame(problems), json),
     }
@@ -196,6 +205,7 @@ impl Words {
             Some(Command::Watch(command)) => command.run(options, self.global.json)?,
             Some(Command::Bake(command)) => command.run(options)?,
             Some(Command::Reference(command)) => command.run(options)?,
+            Some(Command::Compare(command)) => command.run(options)?,
             Some(Command::Media(command)) => command.run(options)?,
             Some(Command::Techniques(command)) => command.run()?,
             Some(Command::Cache(command)) => command.run(options)?,

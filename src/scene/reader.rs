@@ -72,6 +72,18 @@ impl Reader {
         }
     }
 
+    /// An image that nothing names but the user, and the warnings about its pixels; what is no number is an error.
+    /// `encoding` is that of PNG and JPEG.
+    pub fn image(&self, path: &Path, encoding: Encoding) -> Result<(Texture, Vec<Problem>), Problems> {
+        let file = document::read(&self.files, path)?;
+        let texture = decode(&file.bytes, path, encoding)?;
+        let problems = texture.check(path);
+        match problems.iter().any(Problem::is_error) {
+            true => Err(in_order(problems)),
+            false => Ok((texture, problems)),
+        }
+    }
+
     /// Whether a file holds a scene or a material.
     pub fn kind_of(&self, path: &Path) -> Result<Kind, Problem> {
         let root = document::open(&self.files, path)?;
