@@ -4,8 +4,10 @@ use crate::frame::{Frame, Part, Surface, Thing, View};
 use crate::gpu::Shaders;
 use crate::image::Image;
 use crate::problem::{Problem, Problems};
+use crate::reference::{self, Develop};
 use crate::scene::{Scene, Substance, TechniqueText};
 use crate::store::{Plan, Slot};
+use crate::techniques::reference::Reference;
 use crate::techniques::{self, Technique};
 
 /// What somebody wants to see: a scene holds the physics, this holds the method.
@@ -36,6 +38,14 @@ impl Look {
 /// The plan for one picture: a plain list of steps, made without a device, in the order in which light would have it.
 pub fn plan(scene: &Scene, look: &Look, shaders: &Shaders) -> Result<(Plan, Slot<Image>), Problem> {
     let mut plan = Plan::default();
+
+    // The truth is traced, not drawn.
+    if let Some(reference) = Reference::of(&look.technique)? {
+        let settings = reference.settings(scene, &look.view);
+        let film = reference::plan(&mut plan, scene, &settings, reference.max_spp(scene));
+        let picture = plan.add(Develop { film, part: look.view.part });
+        return Ok((plan, picture));
+    }
 
     // Who is in the picture, and which technique is whose.
     let mut frame = Frame::new(scene, &look.view, shaders, &mut plan);
@@ -105,13 +115,16 @@ pub fn check(scene: &Scene, technique: &TechniqueText) -> Result<(), Problems> {
     let mut problems = Vec::new();
     let mut known: Vec<(&str, Box<dyn Technique>)> = Vec::new();
     let named = scene.objects.iter().filter_map(|object| object.technique.as_ref());
-    for text in std::iter::once(technique).chain(named) {
+    let truth = Reference::of(technique)?;
+    let view = std::iter::once(technique).filter(|_| truth.is_none());
+    for text in view.chain(named) {
         match techniques::read(text) {
             Ok(read) => known.push((&text.ron, read)),
             Err(problem) => problems.push(problem),
         }
     }
-    for object in scene.objects.iter().filter(|object| object.material.medium.medium().is_some()) {
+    let drawn = scene.objects.iter().filter(|object| truth.is_none() && object.material.medium.medium().is_some());
+    for object in drawn {
         let text = object.technique.as_ref().unwrap_or(technique);
         let read = known.iter().find(|(ron, _)| *ron == text.ron);
         problems.extend(read.and_then(|(_, read)| read.refuses(&object.material)));

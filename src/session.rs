@@ -7,6 +7,7 @@ use crate::reference::{self, film::Film};
 use crate::render::{self, Look};
 use crate::scene::{Part, Reader, Scene};
 use crate::store::{Disk, Files, Plan, Slot, Store, Watch};
+use crate::techniques::reference::Reference;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -109,15 +110,21 @@ impl Session {
         picture: Slot<Image>,
         watch: &dyn Watch,
     ) -> Result<Arc<Image>, Problem> {
-        self.fits(scene, look)?;
-        let image = self.get(plan, picture, watch)?;
-        if let Some(bad) = image.non_finite() {
-            let (x, y) = bad.first;
-            let what =
-                format!("{} of the picture without a number, the first at {x}, {y}", counted(bad.count, "pixel"));
-            return Err(Problem::new(Cause::Unfinished, what)
-                .hint("this is a mistake in the program or in a shader that was edited; nothing was written"));
-        }
+        let image = match Reference::of(&look.technique)? {
+            Some(reference) => {
+                // No more paths than are needed: the plan holds the most that there may be.
+                let (part, at_most, max_samples) =
+                    (look.view.part, reference.max_error(scene), reference.max_spp(scene));
+                let goal = Goal::Error { part, at_most, max_samples };
+                let film = self.trace(scene, &reference.settings(scene, &look.view), &goal, watch, |_| ())?;
+                Arc::new(film.picture(part))
+            }
+            None => {
+                self.fits(scene, look)?;
+                self.get(plan, picture, watch)?
+            }
+        };
+        whole(&image)?;
         Ok(image)
     }
 
@@ -185,4 +192,13 @@ impl Session {
         self.gpu()?;
         self.store.get_with(plan, slot, self.gpu.as_ref().map(|gpu| gpu as _), watch)
     }
+}
+
+/// That every pixel of a picture holds a number.
+pub fn whole(image: &Image) -> Result<(), Problem> {
+    let Some(bad) = image.non_finite() else { return Ok(()) };
+    let (x, y) = bad.first;
+    let what = format!("{} of the picture without a number, the first at {x}, {y}", counted(bad.count, "pixel"));
+    Err(Problem::new(Cause::Unfinished, what)
+        .hint("this is a mistake in the program or in a shader that was edited; nothing was written"))
 }

@@ -6,7 +6,7 @@ use crate::problem::{At, Cause, Problem, Problems};
 use crate::reference::film::Film;
 use crate::reference::{self, volume::Light};
 use crate::scene::Part;
-use crate::session::{Goal, Options};
+use crate::session::{Goal, Options, whole};
 use crate::store::{Key, Origin};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -168,11 +168,7 @@ impl Trace {
         let progress = Progress::new();
         let film = session.trace(&scene, &settings, &goal, &progress, |film| progress.tell(&level(film, part)))?;
         let picture = film.picture(part);
-        if let Some(bad) = picture.non_finite() {
-            let (x, y) = bad.first;
-            let what = format!("{} without a number, the first at {x}, {y}", counted(bad.count, "pixel"));
-            return Err(Problem::new(Cause::Unfinished, what).hint("this is a mistake in the program").into());
-        }
+        whole(&picture)?;
         let scene_key = Key::of(&scene).to_string();
         let made_by = format!(
             "volume, {:?} light, {part:?} part, {} samples, seed {}",

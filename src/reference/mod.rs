@@ -24,10 +24,10 @@ pub mod volume;
 pub mod world;
 
 use crate::geometry::mesh::Mesh;
-use crate::image::Texture;
+use crate::image::{Image, Texture};
 use crate::optics::Rgb;
 use crate::problem::Problem;
-use crate::scene::{Camera, LightKind, Object, Scene, Sky, Substance, shape};
+use crate::scene::{Camera, LightKind, Object, Part, Scene, Sky, Substance, shape};
 use crate::store::{Bake, Key, Plan, Run, Slot, Step};
 use film::{Film, Moments};
 use glam::{DAffine3, DMat3, DVec3};
@@ -280,6 +280,26 @@ impl Step for Trace {
 
 impl Bake for Trace {
     const CODE: &'static [&'static str] = &["src/reference/", "src/optics/", "src/geometry/", "src/scene/shape.rs"];
+}
+
+/// A film's picture.
+#[derive(Serialize)]
+pub struct Develop {
+    pub film: Slot<Film>,
+    pub part: Part,
+}
+
+impl Step for Develop {
+    type Output = Image;
+    fn name(&self) -> &'static str {
+        "reference.picture"
+    }
+    fn about(&self) -> String {
+        "the mean of all paths".into()
+    }
+    fn run(&self, run: &Run) -> Result<Image, Problem> {
+        Ok(run.get(self.film).picture(self.part))
+    }
 }
 
 /// A pinhole camera's rays.

@@ -248,7 +248,7 @@ impl Default for ReferenceSettings {
 }
 
 /// Which of its three summands a picture shows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub enum Part {
     #[default]
     Full,

@@ -7,12 +7,14 @@
 mod filtered_normals;
 mod local;
 mod opaque;
+pub mod reference;
 
 use crate::frame::Surface;
 use crate::gpu::Images;
 use crate::problem::Problem;
 use crate::scene::{Material, TechniqueText};
 use crate::store::{Plan, Slot};
+use reference::Reference;
 
 /// Radiance per pixel, `rgba32float`, at the sampled size.
 pub type Scattered = Slot<Images>;
@@ -54,10 +56,19 @@ macro_rules! entry {
 }
 
 /// Every technique there is.
-pub const REGISTRY: &[Entry] = &[entry!(opaque, Opaque), entry!(filtered_normals, FilteredNormals)];
+pub const REGISTRY: &[Entry] = &[
+    entry!(opaque, Opaque),
+    entry!(filtered_normals, FilteredNormals),
+    Entry {
+        name: Reference::NAME,
+        manual: include_str!("reference.rs"),
+        // It has no part in a frame: `render::plan` asks for it before it makes one.
+        read: |text| Reference::of(text).and_then(|_| Err(Reference::only_in_the_view(text))),
+    },
+];
 
 /// Techniques that a scene may name one day.
-const LATER: [&str; 12] = [
+const LATER: [&str; 11] = [
     "SphericalThickness",
     "DepthMapThickness",
     "PrecomputedTransfer",
@@ -68,7 +79,6 @@ const LATER: [&str; 12] = [
     "SeparableScreenSpace",
     "AdjacencyMaps",
     "Layered",
-    "Reference",
     "Auto",
 ];
 
@@ -113,7 +123,7 @@ mod tests {
         for entry in REGISTRY {
             assert!(entry.manual_text().lines().count() > 10, "{} has no manual", entry.name);
             let text = TechniqueText::from_flag("--technique", &format!("{}()", entry.name)).unwrap();
-            assert!(read(&text).is_ok());
+            assert!(read(&text).is_ok() || Reference::of(&text).unwrap().is_some());
             let text = TechniqueText::from_flag("--technique", &format!("{}(oops: 1)", entry.name)).unwrap();
             assert!(read(&text).err().unwrap().what.contains("oops"));
         }
