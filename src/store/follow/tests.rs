@@ -33,11 +33,12 @@ impl Desk {
         fs::rename(self.path(from), self.path(to)).unwrap();
     }
 
-    /// Reads files, and follows them from here on.
+    /// Reads files, and follows them from here on: what happens next is seen only if it is heard of.
     fn read(&mut self, names: &[&str]) {
         self.files.forget();
         names.iter().for_each(|name| drop(self.files.read(&self.path(name))));
         self.follow.depend_on(&self.files);
+        self.follow.changed();
     }
 
     /// Waits until exactly these differ from what was read.
@@ -227,6 +228,18 @@ fn folders_may_be_renamed_made_anew_and_renamed_back() {
             desk.write("outer/inner/a", "two");
             desk.sees(&["outer/inner/a"]);
             fs::remove_dir_all(desk.path("elsewhere")).unwrap();
+            // Another with the same content in its place, before anybody looks: the watch went with the first.
+            desk.read(&["outer/inner/a", "b"]);
+            desk.rename(moved, "elsewhere");
+            desk.write("outer/inner/a", "two");
+            desk.sees_nothing_until("b");
+            for round in ["three", "four", "five"] {
+                desk.read(&["outer/inner/a", "b"]);
+                desk.write("outer/inner/a", round);
+                desk.sees(&["outer/inner/a"]);
+            }
+            fs::remove_dir_all(desk.path("elsewhere")).unwrap();
+            fs::remove_file(desk.path("b")).unwrap();
         }
     });
 }
@@ -236,11 +249,11 @@ fn folders_may_be_renamed_made_anew_and_renamed_back() {
 fn links_are_followed_and_may_be_turned() {
     use std::os::unix::fs::symlink;
     both(|desk| {
-        for name in ["first/a", "second/a"] {
+        for name in ["first/a", "second/a", "third/c", "fourth/c"] {
             desk.write(name, name);
         }
         desk.write("here/b", "one");
-        symlink("../first/a", desk.path("here/file")).unwrap();
+        symlink("../third/c", desk.path("here/file")).unwrap();
         symlink("first", desk.path("folder")).unwrap();
         let turn = |desk: &Desk, link: &str, target: &str| {
             symlink(target, desk.path("aside")).unwrap();
@@ -249,14 +262,18 @@ fn links_are_followed_and_may_be_turned() {
         let all = ["folder/a", "here/file"];
         desk.read(&all);
         desk.replace("first/a", "new");
-        desk.sees(&all);
+        desk.sees(&all[..1]);
         desk.read(&all);
-        turn(desk, "here/file", "../second/a");
+        desk.replace("third/c", "new");
+        desk.sees(&all[1..]);
+        desk.read(&all);
+        turn(desk, "here/file", "../fourth/c");
         desk.sees(&["here/file"]);
         turn(desk, "folder", "second");
         desk.sees(&all);
         desk.read(&all);
         desk.write("second/a", "newer");
+        desk.write("fourth/c", "newer");
         desk.sees(&all);
         // Nowhere, and in a circle.
         desk.read(&all);
