@@ -24,7 +24,7 @@
 //! ```
 //!
 //! No arrow goes back; problems leave sideways. Bytes enter through one door, [`store::Files`], which names them by hash.
-//! Start reading at [`render::plan`].
+//! Start reading at `line` in [`render`].
 //!
 //! # The rooms
 //!

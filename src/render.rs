@@ -1,8 +1,8 @@
-//! The straight line from scene to image. Start reading at [`plan`].
+//! The straight line from scene to image. Start reading at `line`.
 
 use crate::frame::{Frame, Part, Surface, Thing, View};
-use crate::gpu::Shaders;
-use crate::image::Image;
+use crate::gpu::{Images, Shaders};
+use crate::image::{Display, Image};
 use crate::problem::{Problem, Problems};
 use crate::scene::{Scene, Substance, TechniqueText};
 use crate::store::{Plan, Slot};
@@ -35,6 +35,26 @@ impl Look {
 
 /// The plan for one picture: a plain list of steps, made without a device, in the order in which light would have it.
 pub fn plan(scene: &Scene, look: &Look, shaders: &Shaders) -> Result<(Plan, Slot<Image>), Problem> {
+    line(scene, look, shaders, |frame, plan, picture| Ok(frame.read_back(plan, picture)))
+}
+
+/// The plan for one picture that stays on the device, as a display is sent it.
+pub fn plan_shown(
+    scene: &Scene,
+    look: &Look,
+    display: Display,
+    shaders: &Shaders,
+) -> Result<(Plan, Slot<Images>), Problem> {
+    line(scene, look, shaders, |frame, plan, picture| frame.display(plan, picture, display))
+}
+
+/// The line itself, and what becomes of the picture at its end.
+fn line<T>(
+    scene: &Scene,
+    look: &Look,
+    shaders: &Shaders,
+    end: impl FnOnce(&Frame, &mut Plan, Slot<Images>) -> Result<Slot<T>, Problem>,
+) -> Result<(Plan, Slot<T>), Problem> {
     let mut plan = Plan::default();
 
     // Who is in the picture, and which technique is whose.
@@ -55,8 +75,9 @@ pub fn plan(scene: &Scene, look: &Look, shaders: &Shaders) -> Result<(Plan, Slot
     // Light that did not, and the sum.
     let glossy = frame.gloss(&mut plan, gbuffer)?;
     let composed = frame.compose(&mut plan, gbuffer, scattered, glossy)?;
-    let picture = frame.picture(&mut plan, composed)?;
-    Ok((plan, picture))
+    let picture = frame.resolve(&mut plan, composed)?;
+    let end = end(&frame, &mut plan, picture)?;
+    Ok((plan, end))
 }
 
 /// Objects that share a technique with the same settings.

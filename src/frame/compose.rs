@@ -3,7 +3,7 @@
 use super::shape::{self, Stream};
 use super::{DEPTH, Frame, Item, PACKED, POSITION, Part, Thing, tables};
 use crate::gpu::{Bind, Blend, Depth, Format, Fullscreen, Gpu, Images, Layer, Raster, Sampler};
-use crate::image::Image;
+use crate::image::{Display, Image, Tone};
 use crate::problem::Problem;
 use crate::scene::Substance;
 use crate::store::{Plan, Run, Slot, Step};
@@ -183,10 +183,10 @@ impl Frame<'_> {
         }))
     }
 
-    /// Samples become pixels, and the picture comes back from the device.
-    pub(crate) fn picture(&self, plan: &mut Plan, composed: Slot<Images>) -> Result<Slot<Image>, Problem> {
+    /// Samples become pixels: linear, on the device.
+    pub(crate) fn resolve(&self, plan: &mut Plan, composed: Slot<Images>) -> Result<Slot<Images>, Problem> {
         let samples = self.view.antialias;
-        let resolved = match samples {
+        Ok(match samples {
             1 => composed,
             _ => plan.add(Fullscreen {
                 name: "frame.resolve",
@@ -199,8 +199,37 @@ impl Frame<'_> {
                     ("picture", Bind::Texture(composed, 0)),
                 ],
             }),
+        })
+    }
+
+    /// The picture, back from the device.
+    pub(crate) fn read_back(&self, plan: &mut Plan, resolved: Slot<Images>) -> Slot<Image> {
+        plan.add(ReadBack { picture: resolved })
+    }
+
+    /// The picture as a display is sent it, 8 bits a channel: the levels that [`Image::encode`] gives a PNG.
+    pub(crate) fn display(
+        &self,
+        plan: &mut Plan,
+        resolved: Slot<Images>,
+        display: Display,
+    ) -> Result<Slot<Images>, Problem> {
+        let tone = match display.tone {
+            Tone::Clamp => tables::CLAMP,
+            Tone::Srgb => tables::SRGB,
+            Tone::Filmic => tables::FILMIC,
         };
-        Ok(plan.add(ReadBack { picture: resolved }))
+        Ok(plan.add(Fullscreen {
+            name: "frame.display",
+            about: format!("exposed by {:+} stops, through the curve {:?}", display.exposure_ev, display.tone),
+            shader: self.shaders.load("frame/display.wgsl", &[])?,
+            size: self.view.size,
+            targets: vec![Format::Rgba8Unorm],
+            binds: vec![
+                ("display", Bind::uniform(&tables::Display { gain: display.exposure_ev.exp2(), tone })),
+                ("picture", Bind::Texture(resolved, 0)),
+            ],
+        }))
     }
 }
 

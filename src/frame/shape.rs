@@ -80,6 +80,7 @@ struct Worn {
 
 impl Step for Worn {
     type Output = Mesh;
+    const NEEDS_HOST: bool = false;
     fn name(&self) -> &'static str {
         "geometry.worn"
     }
@@ -256,6 +257,7 @@ struct Quad {
 
 impl Step for Quad {
     type Output = Mesh;
+    const NEEDS_HOST: bool = false;
     fn name(&self) -> &'static str {
         "geometry.quad"
     }
