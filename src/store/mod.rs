@@ -6,6 +6,7 @@
 mod code;
 mod disk;
 mod files;
+mod follow;
 mod get;
 mod key;
 mod plan;
@@ -13,6 +14,7 @@ mod run;
 
 pub use disk::{Disk, Entry, Swept};
 pub use files::{File, Files};
+pub use follow::Follow;
 pub use get::{Finished, Origin, State, Store, Values, Watch};
 pub use key::Key;
 pub use plan::{Bake, Plan, PlannedStep, Skipped, Slot, Step};
