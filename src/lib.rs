@@ -44,6 +44,7 @@
 //! | [`techniques`] | one folder = one paper's way, with its manual | their bakes: shape, medium or kernel change |
 //! | [`render`] | the straight line from scene to image | |
 //! | [`session`] | what a command holds while it works | |
+//! | `preview` | the window; a feature of the build | a hand, a file or the worker moves |
 //! | [`commands`] | the words of the command line | |
 //!
 //! # What always holds
@@ -70,6 +71,8 @@ pub mod gpu;
 pub mod image;
 pub mod optics;
 pub mod papers;
+#[cfg(feature = "preview")]
+pub mod preview;
 pub mod problem;
 pub mod render;
 pub mod scene;

@@ -48,6 +48,15 @@ pub fn plan_shown(
     line(scene, look, shaders, |frame, plan, picture| frame.display(plan, picture, display))
 }
 
+/// The plan for what stands at the first pixel: an object's place in the scene.
+pub fn plan_seen(scene: &Scene, look: &Look, shaders: &Shaders) -> Result<(Plan, Slot<Option<usize>>), Problem> {
+    let mut plan = Plan::default();
+    let frame = Frame::new(scene, &look.view, shaders, &mut plan);
+    let gbuffer = frame.gbuffer(&mut plan)?;
+    let seen = frame.seen(&mut plan, gbuffer);
+    Ok((plan, seen))
+}
+
 /// The line itself, and what becomes of the picture at its end.
 fn line<T>(
     scene: &Scene,

@@ -15,6 +15,7 @@ pub const FIRST_SESSION: &str = "\
 A first session:
   diaphane new pebble                        write pebble.ron and pebble.material.ron
   diaphane render pebble.ron -o pebble.png   make a picture of it
+  diaphane preview pebble.ron                look at it in a window, and edit
   diaphane check pebble.ron                  after an edit: say all that is wrong with it
   diaphane explain pebble.ron                say what a picture takes, and what it does not
   diaphane techniques                        list the ways of making light go through things";
@@ -29,9 +30,8 @@ Exit status:
 `diaphane help COMMAND` says more of each.";
 
 /// Words that will mean something, and what does something like it by now.
-const LATER: [(&str, &str); 6] = [
+const LATER: [(&str, &str); 5] = [
     ("watch", "run `diaphane render` after each edit: what did not change comes from the cache"),
-    ("preview", "`diaphane render SCENE -o OUT.png` makes a picture"),
     ("reference", "`diaphane render SCENE -o OUT.exr` makes a picture by a real-time technique"),
     ("compare", "`diaphane render SCENE -o OUT.exr` writes linear light, for other programs to compare"),
     ("bench", "`diaphane render SCENE -o OUT.png --timings` says what each step took"),

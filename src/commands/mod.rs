@@ -9,6 +9,7 @@ mod help;
 mod look;
 mod media;
 mod new;
+mod preview;
 mod progress;
 mod render;
 mod techniques;
@@ -58,6 +59,7 @@ enum Command {
     Check(check::Check),
     Explain(explain::Explain),
     Techniques(techniques::Techniques),
+    Preview(preview::Preview),
     Bake(bake::Bake),
     #[command(subcommand)]
     Media(media::Media),
@@ -133,7 +135,12 @@ pub fn answer(words: impl IntoIterator<Item = OsString>) -> Said {
     let json = words.global.json;
     match words.run() {
         Ok(answer) => {
-            let facts = if json { pretty(&answer.json) } else { answer.text };
+            // Null: all was said while it happened.
+            let facts = match json {
+                true if answer.json.is_null() => String::new(),
+                true => pretty(&answer.json),
+                false => answer.text,
+            };
             Said { facts, talk: Problems(answer.warnings).to_string(), status: 0 }
         }
         Err(problems) => Said::wrong(&blame(problems), json),
@@ -187,6 +194,7 @@ impl Words {
             Some(Command::Check(command)) => command.run(options)?,
             Some(Command::Explain(command)) => return command.run(options),
             Some(Command::Render(command)) => command.run(options, &line)?,
+            Some(Command::Preview(command)) => return Ok(command.run(options, self.global.json)?),
             Some(Command::Bake(command)) => command.run(options)?,
             Some(Command::Media(command)) => command.run(options)?,
             Some(Command::Techniques(command)) => command.run()?,

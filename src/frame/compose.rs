@@ -207,6 +207,15 @@ impl Frame<'_> {
         plan.add(ReadBack { picture: resolved })
     }
 
+    /// Which object is seen at the first pixel.
+    pub(crate) fn seen(&self, plan: &mut Plan, gbuffer: Slot<Images>) -> Slot<Option<usize>> {
+        let object = |item: &Item| match item.thing {
+            Thing::Object(place) => Some(place),
+            Thing::Light(_) => None,
+        };
+        plan.add(Seen { gbuffer, objects: self.items.iter().map(object).collect() })
+    }
+
     /// The picture as a display is sent it, 8 bits a channel: the levels that [`Image::encode`] gives a PNG.
     pub(crate) fn display(
         &self,
@@ -230,6 +239,30 @@ impl Frame<'_> {
                 ("picture", Bind::Texture(resolved, 0)),
             ],
         }))
+    }
+}
+
+/// Which object stands at the first pixel of the G-buffer: its place in the scene.
+#[derive(Serialize)]
+struct Seen {
+    gbuffer: Slot<Images>,
+    /// For each thing that is drawn, the place of the object that it is.
+    objects: Vec<Option<usize>>,
+}
+
+impl Step for Seen {
+    type Output = Option<usize>;
+    fn name(&self) -> &'static str {
+        "frame.seen"
+    }
+    fn about(&self) -> String {
+        "which object is seen".into()
+    }
+    fn run(&self, run: &Run) -> Result<Option<usize>, Problem> {
+        let bytes = run.host::<Gpu>().read_texture(&run.get(self.gbuffer).0[POSITION])?;
+        let w = f32::from_le_bytes(bytes[12..16].try_into().expect("a texel has four floats"));
+        // 0 is the background.
+        Ok((w as usize).checked_sub(1).and_then(|place| self.objects.get(place).copied().flatten()))
     }
 }
 
