@@ -67,10 +67,6 @@ impl Times {
         }
     }
 
-    pub fn clear(&mut self) {
-        self.0.clear();
-    }
-
     /// Name, median and 95th percentile, by name.
     pub fn rows(&self) -> impl Iterator<Item = (&'static str, f64, f64)> {
         self.0.iter().map(|(name, times)| {

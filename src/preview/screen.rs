@@ -76,19 +76,23 @@ impl Screen {
     }
 
     /// Paints, and shows it. False: the surface was not ready, so ask again.
-    pub fn present(&mut self, painting: &Painting) -> Result<bool, Problem> {
-        for (id, deltas) in &painting.textures.set {
+    pub fn present(&mut self, painting: &mut Painting) -> Result<bool, Problem> {
+        let mut textures = std::mem::take(&mut painting.textures);
+        for (id, deltas) in &textures.set {
             for delta in deltas {
                 self.renderer.update_texture(&self.gpu.device, &self.gpu.queue, *id, delta);
             }
         }
+        let free: Vec<TextureId> = textures.free.iter().copied().collect();
+        textures.clear(); // it insists on being dealt with
+        let painting = &*painting;
         let shown = self.surface_texture()?.map(|texture| {
             let view = texture.texture.create_view(&Default::default());
             self.paint(painting, &view);
             self.window.pre_present_notify();
             self.gpu.queue.present(texture);
         });
-        painting.textures.free.iter().for_each(|id| self.renderer.free_texture(id));
+        free.iter().for_each(|id| self.renderer.free_texture(id));
         self.gpu.check("the window")?;
         Ok(shown.is_some())
     }

@@ -9,7 +9,7 @@ use crate::gpu::{Gpu, Images, Shaders};
 use crate::image::{Display, Image};
 use crate::problem::{Problem, Problems};
 use crate::render::{self, Look};
-use crate::scene::{Camera, Scene};
+use crate::scene::Camera;
 use crate::session::Options;
 use crate::store::{Disk, Finished, Key, Origin, Plan, Skipped, Slot, Store, Watch};
 use std::sync::{Arc, Mutex};
@@ -86,10 +86,6 @@ impl Stage {
 
     pub fn subject(&self) -> Option<&Subject> {
         self.wanted.as_ref()
-    }
-
-    pub fn scene(&self) -> Option<&Arc<Scene>> {
-        Some(&self.wanted.as_ref()?.scene)
     }
 
     /// From now on this is to be seen.

@@ -311,13 +311,13 @@ impl Preview {
         self.frames += 1;
         let now = Instant::now();
         self.play(now);
-        let (painting, wishes, repaint) = self.lay_out(screen);
+        let (mut painting, wishes, repaint) = self.lay_out(screen);
         wishes.into_iter().for_each(|wish| self.grant(wish, screen));
         screen.gpu.timed = self.panel.timed && self.panel.shown;
         self.draw(screen, now);
         let rest = self.pace.rest(Instant::now());
         self.next = [rest, repaint].into_iter().flatten().min();
-        if !screen.present(&painting)? {
+        if !screen.present(&mut painting)? {
             self.next = Some(now + Duration::from_millis(50));
         }
         if let Some(file) = self.capture.take() {
