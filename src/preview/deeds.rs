@@ -192,7 +192,8 @@ impl Preview {
 
     /// Writes all of the window.
     pub fn write_capture(&mut self, screen: &mut Screen, painting: &Painting, file: PathBuf) {
-        let written = screen.capture(painting).and_then(|(levels, (width, height))| {
+        let written = screen.capture(painting).and_then(|captured| {
+            let (levels, (width, height)) = (captured.levels, captured.size);
             let pixels = levels.iter().map(|texel| texel.map(|level| linear_from_srgb(f32::from(level) / 255.0)));
             let image = Image { width, height, pixels: pixels.collect() };
             let display = Display { tone: Tone::Srgb, exposure_ev: 0.0 };

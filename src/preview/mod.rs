@@ -39,12 +39,14 @@ use crate::session::Options;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+/// How a scene that was read is to be looked at.
+pub type LookOf = Box<dyn Fn(&Scene) -> Result<Look, Problems> + Send>;
+
 /// What somebody wants to see.
 pub struct Asked {
     pub options: Options,
     pub scene: PathBuf,
-    /// How the scene is looked at when it was read.
-    pub look: Box<dyn Fn(&Scene) -> Result<Look, Problems> + Send>,
+    pub look: LookOf,
     /// The window's first size in pixels, if not the usual one.
     pub size: Option<(u32, u32)>,
     /// Whether programs listen on stdout and speak on stdin.

@@ -22,7 +22,8 @@ pub struct Said<'a> {
 
 pub enum Waits {
     ForFiles,
-    ForStep(Option<Progress>),
+    /// And whether an older picture is in view meanwhile.
+    ForStep(Option<Progress>, bool),
 }
 
 /// The picture fills what is left of the window. Gives its place.
@@ -94,8 +95,11 @@ fn top(ui: &mut Ui, rect: Rect, said: &Said) {
             ui.visuals_mut().override_text_color = Some(Color32::WHITE);
             match waits {
                 Waits::ForFiles => drop(ui.label("reading the files")),
-                Waits::ForStep(progress) => {
-                    ui.label("older than the files; the new picture waits for");
+                Waits::ForStep(progress, older) => {
+                    ui.label(match older {
+                        true => "older than the files; the new picture waits for",
+                        false => "the picture waits for",
+                    });
                     let (about, share) = progress.as_ref().map_or(("its turn", 0.0), |p| (&p.about, p.share));
                     ui.label(RichText::new(about).strong());
                     let width = rect.width().min(260.0) - 20.0;

@@ -94,7 +94,7 @@ impl Panel {
                 wishes.push(Wish::Screenshot);
             }
             ui.add_space(6.0);
-            ui.label(RichText::new(HANDS).small().weak());
+            ui.label(RichText::new(HANDS).weak());
         });
     }
 
@@ -161,7 +161,7 @@ impl Panel {
 
     fn cost(&mut self, ui: &mut Ui, facts: &Facts) {
         heading(ui, "What it takes");
-        ui.label(RichText::new(&facts.adapter).small());
+        ui.label(&facts.adapter);
         let Some(drawn) = facts.drawn else { return };
         let (width, height) = (drawn.picture.0[0].shape.width, drawn.picture.0[0].shape.height);
         let ms = 1e3 * drawn.time.as_secs_f64();
@@ -213,7 +213,10 @@ fn time(ui: &mut Ui, facts: &Facts, wishes: &mut Vec<Wish>) {
 }
 
 const HANDS: &str = "\
-drag: turn   shift or middle drag: shift
-wheel: nearer   click: choose   double click: look at it
-F: look at what is chosen   R: as in the file
-space: play   P: write a picture   H: hide this";
+drag: turn; with shift or the middle button: shift
+wheel: nearer or farther
+click: choose; double click: look at it
+F: look at what is chosen, or at all
+R: as in the file
+space: play      P: write a picture
+H: hide this panel";

@@ -28,6 +28,12 @@ pub struct Painting {
     pub pixels_per_point: f32,
 }
 
+/// What a window shows: red, green and blue of each pixel, row 0 at the top.
+pub struct Captured {
+    pub levels: Vec<[u8; 3]>,
+    pub size: (u32, u32),
+}
+
 impl Screen {
     pub fn open(window: Arc<Window>, adapter: Option<&str>) -> Result<Screen, Problem> {
         let (gpu, surface, capabilities) = Gpu::open_for(window.clone(), adapter)?;
@@ -150,8 +156,8 @@ impl Screen {
         queue.submit(more.into_iter().chain([encoder.finish()]));
     }
 
-    /// The whole window as levels, red, green, blue, and its size.
-    pub fn capture(&mut self, painting: &Painting) -> Result<(Vec<[u8; 3]>, (u32, u32)), Problem> {
+    /// The whole window.
+    pub fn capture(&mut self, painting: &Painting) -> Result<Captured, Problem> {
         let size = self.size().ok_or_else(|| Problem::new(Cause::Unfinished, "a minimised window shows nothing"))?;
         let swapped = self.config.format == wgpu::TextureFormat::Bgra8Unorm;
         let format = if swapped { Format::Bgra8Unorm } else { Format::Rgba8Unorm };
@@ -162,6 +168,6 @@ impl Screen {
             true => [texel[2], texel[1], texel[0]],
             false => [texel[0], texel[1], texel[2]],
         };
-        Ok((bytes.chunks_exact(4).map(level).collect(), size))
+        Ok(Captured { levels: bytes.chunks_exact(4).map(level).collect(), size })
     }
 }

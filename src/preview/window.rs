@@ -349,7 +349,9 @@ impl Preview {
         let current = self.drawn.as_ref().is_some_and(|drawn| drawn.current);
         let waits = match (current && !self.reads, self.stage.subject()) {
             (true, _) => None,
-            (false, Some(_)) if !self.reads && problems.0.is_empty() => Some(Waits::ForStep(self.stage.progress())),
+            (false, Some(_)) if !self.reads && problems.0.is_empty() => {
+                Some(Waits::ForStep(self.stage.progress(), self.drawn.is_some()))
+            }
             (false, None) if problems.0.is_empty() => Some(Waits::ForFiles),
             _ => None,
         };
@@ -427,8 +429,11 @@ impl Preview {
             self.told_picture = Some(drawn.key);
             self.tell_picture(screen, &drawn, whole);
         }
-        // The texture binding keeps what the last frame showed; the picture itself is kept here.
-        self.drawn = Some(drawn);
+        match &mut self.drawn {
+            // The same picture again: what it took is what it took when it was made.
+            Some(old) if old.key == drawn.key => old.current = drawn.current,
+            _ => self.drawn = Some(drawn),
+        }
     }
 
     fn tell_picture(&mut self, screen: &Screen, drawn: &Drawn, whole: bool) {
