@@ -24,7 +24,7 @@
 //! ```
 //!
 //! No arrow goes back; problems leave sideways. Bytes enter through one door, [`store::Files`], which names them by hash.
-//! Start reading at [`render::plan`].
+//! Start reading at `line` in [`render`].
 //!
 //! # The rooms
 //!
@@ -45,6 +45,7 @@
 //! | [`techniques`] | one folder = one paper's way, with its manual | their bakes: shape, medium or kernel change |
 //! | [`render`] | the straight line from scene to image | |
 //! | [`session`] | what a command holds while it works | |
+//! | `preview` | the window; a feature of the build | a hand, a file or the worker moves |
 //! | [`commands`] | the words of the command line | |
 //!
 //! # What always holds
@@ -72,6 +73,8 @@ pub mod image;
 pub mod metric;
 pub mod optics;
 pub mod papers;
+#[cfg(feature = "preview")]
+pub mod preview;
 pub mod problem;
 pub mod reference;
 pub mod render;

@@ -1,8 +1,8 @@
-//! The straight line from scene to image. Start reading at [`plan`].
+//! The straight line from scene to image. Start reading at `line`.
 
 use crate::frame::{Frame, Part, Surface, Thing, View};
-use crate::gpu::Shaders;
-use crate::image::Image;
+use crate::gpu::{Images, Shaders};
+use crate::image::{Display, Image};
 use crate::problem::{Problem, Problems};
 use crate::reference::{self, Develop};
 use crate::scene::{Scene, Substance, TechniqueText};
@@ -37,15 +37,49 @@ impl Look {
 
 /// The plan for one picture: a plain list of steps, made without a device, in the order in which light would have it.
 pub fn plan(scene: &Scene, look: &Look, shaders: &Shaders) -> Result<(Plan, Slot<Image>), Problem> {
-    let mut plan = Plan::default();
-
     // The truth is traced, not drawn.
-    if let Some(reference) = Reference::of(&look.technique)? {
-        let settings = reference.settings(scene, &look.view);
-        let film = reference::plan(&mut plan, scene, &settings, reference.max_spp(scene));
+    if let Some(truth) = Reference::of(&look.technique)? {
+        let mut plan = Plan::default();
+        let film = reference::plan(&mut plan, scene, &truth.settings(scene, &look.view), truth.max_spp(scene));
         let picture = plan.add(Develop { film, part: look.view.part });
         return Ok((plan, picture));
     }
+    line(scene, look, shaders, |frame, plan, picture| Ok(frame.read_back(plan, picture)))
+}
+
+/// The plan for one picture that stays on the device, as a display is sent it.
+pub fn plan_shown(
+    scene: &Scene,
+    look: &Look,
+    display: Display,
+    shaders: &Shaders,
+) -> Result<(Plan, Slot<Images>), Problem> {
+    if Reference::of(&look.technique)?.is_some() {
+        return Err(look
+            .technique
+            .problem("", "the window does not show the reference in this version")
+            .hint("`diaphane render` and `diaphane watch` do, and `diaphane reference` says how far it is"));
+    }
+    line(scene, look, shaders, |frame, plan, picture| frame.display(plan, picture, display))
+}
+
+/// The plan for what stands at the first pixel: an object's place in the scene.
+pub fn plan_seen(scene: &Scene, look: &Look, shaders: &Shaders) -> Result<(Plan, Slot<Option<usize>>), Problem> {
+    let mut plan = Plan::default();
+    let frame = Frame::new(scene, &look.view, shaders, &mut plan);
+    let gbuffer = frame.gbuffer(&mut plan)?;
+    let seen = frame.seen(&mut plan, gbuffer);
+    Ok((plan, seen))
+}
+
+/// The line itself, and what becomes of the picture at its end.
+fn line<T>(
+    scene: &Scene,
+    look: &Look,
+    shaders: &Shaders,
+    end: impl FnOnce(&Frame, &mut Plan, Slot<Images>) -> Result<Slot<T>, Problem>,
+) -> Result<(Plan, Slot<T>), Problem> {
+    let mut plan = Plan::default();
 
     // Who is in the picture, and which technique is whose.
     let mut frame = Frame::new(scene, &look.view, shaders, &mut plan);
@@ -65,8 +99,9 @@ pub fn plan(scene: &Scene, look: &Look, shaders: &Shaders) -> Result<(Plan, Slot
     // Light that did not, and the sum.
     let glossy = frame.gloss(&mut plan, gbuffer)?;
     let composed = frame.compose(&mut plan, gbuffer, scattered, glossy)?;
-    let picture = frame.picture(&mut plan, composed)?;
-    Ok((plan, picture))
+    let picture = frame.resolve(&mut plan, composed)?;
+    let end = end(&frame, &mut plan, picture)?;
+    Ok((plan, end))
 }
 
 /// Objects that share a technique with the same settings.

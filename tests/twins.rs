@@ -4,7 +4,9 @@
 mod studio;
 
 use diaphane::gpu::{Bind, Buffer, Compute, Gpu, Shaders};
+use diaphane::image::{Display, Format, Tone};
 use diaphane::optics::{fresnel, microfacet, sh};
+use diaphane::render::{self, Look};
 use diaphane::store::{Key, Plan, Store};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -241,4 +243,52 @@ fn every_twin_has_its_partner() {
     }
     assert_eq!(found, tested, "twins that are there (left) and tested (right)");
     assert_eq!(shader_functions("fn a(x: f32) -> f32 {\n}\nfn b(y: f32, z: vec3f) {\n").len(), 2);
+}
+
+/// The levels that a window shows, by pixel, and those of a PNG.
+fn levels(curve: Tone, exposure_ev: f32) -> (Vec<[u8; 3]>, Vec<[u8; 3]>) {
+    let mut studio = studio();
+    // From black far into white, coloured light on one side.
+    let scene = studio.scene(
+        r#"camera: (eye: (0, 0, 5)),
+        lights: [
+            Directional(direction: (-1, -0.4, -0.2), irradiance: (60, 20, 1)),
+            Directional(direction: (1, 0.2, -0.6), irradiance: (0.02, 0.3, 0.9), shadow: false),
+            Environment(radiance: (0.001, 0.004, 0.002)),
+        ],
+        objects: [(name: "ball", mesh: Sphere(radius: 1, subdivisions: 4))],
+        view: (technique: Opaque(), size: (64, 48), antialias: 2)"#,
+    );
+    let look = Look::of(&scene);
+    let display = Display { tone: curve, exposure_ev };
+    let (_, image) = studio.shoot(&scene, &look);
+    let png = image.encode(Format::Png, display, &[]).unwrap_or_else(|problem| panic!("{problem}"));
+    let png = image::load_from_memory(&png).expect("it is a PNG").to_rgb8().pixels().map(|pixel| pixel.0).collect();
+    let (plan, shown) = render::plan_shown(&scene, &look, display, &studio.session.shaders).expect("it can be planned");
+    let shown = studio.session.get(&plan, shown, &Nobody).unwrap_or_else(|problem| panic!("{problem}"));
+    let gpu = studio.session.gpu().unwrap_or_else(|problem| panic!("{problem}"));
+    let bytes = gpu.read_texture(&shown.0[0]).unwrap_or_else(|problem| panic!("{problem}"));
+    (bytes.chunks_exact(4).map(|texel| [texel[0], texel[1], texel[2]]).collect(), png)
+}
+
+fn furthest(a: &[[u8; 3]], b: &[[u8; 3]]) -> u8 {
+    assert_eq!(a.len(), b.len());
+    a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0)
+}
+
+#[test]
+fn a_window_shows_the_levels_that_a_png_stores() {
+    for curve in [Tone::Clamp, Tone::Srgb, Tone::Filmic] {
+        for exposure_ev in [-3.0, 0.0, 2.5] {
+            let (window, png) = levels(curve, exposure_ev);
+            let apart = furthest(&window, &png);
+            assert!(apart <= 1, "{curve:?} at {exposure_ev}: {apart} levels apart");
+        }
+    }
+    // The pictures have all that could differ, and a curve taken for another is seen.
+    let (filmic, _) = levels(Tone::Filmic, 0.0);
+    let (dark, bright) = (filmic.iter().flatten().min(), filmic.iter().flatten().max());
+    assert!(dark < Some(&20) && bright > Some(&235), "{dark:?} to {bright:?}");
+    assert!(furthest(&filmic, &levels(Tone::Srgb, 0.0).1) > 5);
+    assert!(furthest(&filmic, &levels(Tone::Filmic, 0.1).1) > 2);
 }

@@ -15,6 +15,7 @@ pub const FIRST_SESSION: &str = "\
 A first session:
   diaphane new pebble                        write pebble.ron and pebble.material.ron
   diaphane render pebble.ron -o pebble.png   make a picture of it
+  diaphane preview pebble.ron                look at it in a window, and edit
   diaphane check pebble.ron                  after an edit: say all that is wrong with it
   diaphane explain pebble.ron                say what a picture takes, and what it does not
   diaphane techniques                        list the ways of making light go through things";
@@ -30,10 +31,7 @@ Exit status:
 `diaphane help COMMAND` says more of each.";
 
 /// Words that will mean something, and what does something like it by now.
-const LATER: [(&str, &str); 2] = [
-    ("preview", "`diaphane render SCENE -o OUT.png` makes a picture"),
-    ("bench", "`diaphane render SCENE -o OUT.png --timings` says what each step took"),
-];
+const LATER: [(&str, &str); 1] = [("bench", "`diaphane render SCENE -o OUT.png --timings` says what each step took")];
 
 /// Whether words that cannot be read ask for JSON.
 pub fn wants_json(words: &[OsString]) -> bool {

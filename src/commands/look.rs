@@ -45,6 +45,12 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
 }
 
 impl LookFlags {
+    /// The size that was asked for.
+    #[cfg(feature = "preview")]
+    pub fn size(&self) -> Option<(u32, u32)> {
+        self.size
+    }
+
     /// The scene's own look, changed as the flags say, and possible with the scene's materials.
     pub fn look(&self, scene: &Scene) -> Result<Look, Problems> {
         let mut look = Look::of(scene);

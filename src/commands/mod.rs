@@ -10,6 +10,7 @@ mod help;
 mod look;
 mod media;
 mod new;
+mod preview;
 mod progress;
 mod reference;
 mod render;
@@ -64,6 +65,7 @@ enum Command {
     Explain(explain::Explain),
     Reference(Box<reference::Reference>),
     Techniques(techniques::Techniques),
+    Preview(preview::Preview),
     Bake(bake::Bake),
     Compare(compare::Compare),
     #[command(subcommand)]
@@ -203,6 +205,7 @@ impl Words {
             Some(Command::Explain(command)) => return command.run(options),
             Some(Command::Render(command)) => command.run(options, &line)?,
             Some(Command::Watch(command)) => command.run(options, self.global.json)?,
+            Some(Command::Preview(command)) => return Ok(command.run(options, self.global.json)?),
             Some(Command::Bake(command)) => command.run(options)?,
             Some(Command::Reference(command)) => command.run(options)?,
             Some(Command::Compare(command)) => command.run(options)?,

@@ -1,8 +1,8 @@
 //! What follows the techniques: gloss, what passes through, the sum, and the picture.
 
-use super::{Frame, PACKED, POSITION, Part, Thing, tables};
+use super::{Frame, Item, PACKED, POSITION, Part, Thing, tables};
 use crate::gpu::{Bind, Blend, Depth, Format, Fullscreen, Gpu, Images, Layer, Raster};
-use crate::image::Image;
+use crate::image::{Display, Image, Tone};
 use crate::problem::Problem;
 use crate::scene::Substance;
 use crate::store::{Plan, Run, Slot, Step};
@@ -109,10 +109,10 @@ impl Frame<'_> {
         }))
     }
 
-    /// Samples become pixels, and the picture comes back from the device.
-    pub(crate) fn picture(&self, plan: &mut Plan, composed: Slot<Images>) -> Result<Slot<Image>, Problem> {
+    /// Samples become pixels: linear, on the device.
+    pub(crate) fn resolve(&self, plan: &mut Plan, composed: Slot<Images>) -> Result<Slot<Images>, Problem> {
         let samples = self.view.antialias;
-        let resolved = match samples {
+        Ok(match samples {
             1 => composed,
             _ => plan.add(Fullscreen {
                 name: "frame.resolve",
@@ -125,8 +125,70 @@ impl Frame<'_> {
                     ("picture", Bind::Texture(composed, 0)),
                 ],
             }),
+        })
+    }
+
+    /// The picture, back from the device.
+    pub(crate) fn read_back(&self, plan: &mut Plan, resolved: Slot<Images>) -> Slot<Image> {
+        plan.add(ReadBack { picture: resolved })
+    }
+
+    /// Which object is seen at the first pixel.
+    pub(crate) fn seen(&self, plan: &mut Plan, gbuffer: Slot<Images>) -> Slot<Option<usize>> {
+        let object = |item: &Item| match item.thing {
+            Thing::Object(place) => Some(place),
+            Thing::Light(_) => None,
         };
-        Ok(plan.add(ReadBack { picture: resolved }))
+        plan.add(Seen { gbuffer, objects: self.items.iter().map(object).collect() })
+    }
+
+    /// The picture as a display is sent it, 8 bits a channel: the levels that [`Image::encode`] gives a PNG.
+    pub(crate) fn display(
+        &self,
+        plan: &mut Plan,
+        resolved: Slot<Images>,
+        display: Display,
+    ) -> Result<Slot<Images>, Problem> {
+        let tone = match display.tone {
+            Tone::Clamp => tables::CLAMP,
+            Tone::Srgb => tables::SRGB,
+            Tone::Filmic => tables::FILMIC,
+        };
+        Ok(plan.add(Fullscreen {
+            name: "frame.display",
+            about: format!("exposed by {:+} stops, through the curve {:?}", display.exposure_ev, display.tone),
+            shader: self.shaders.load("frame/display.wgsl", &[])?,
+            size: self.view.size,
+            targets: vec![Format::Rgba8Unorm],
+            binds: vec![
+                ("display", Bind::uniform(&tables::Display { gain: display.exposure_ev.exp2(), tone })),
+                ("picture", Bind::Texture(resolved, 0)),
+            ],
+        }))
+    }
+}
+
+/// Which object stands at the first pixel of the G-buffer: its place in the scene.
+#[derive(Serialize)]
+struct Seen {
+    gbuffer: Slot<Images>,
+    /// For each thing that is drawn, the place of the object that it is.
+    objects: Vec<Option<usize>>,
+}
+
+impl Step for Seen {
+    type Output = Option<usize>;
+    fn name(&self) -> &'static str {
+        "frame.seen"
+    }
+    fn about(&self) -> String {
+        "which object is seen".into()
+    }
+    fn run(&self, run: &Run) -> Result<Option<usize>, Problem> {
+        let bytes = run.host::<Gpu>().read_texture(&run.get(self.gbuffer).0[POSITION])?;
+        let w = f32::from_le_bytes(bytes[12..16].try_into().expect("a texel has four floats"));
+        // 0 is the background.
+        Ok((w as usize).checked_sub(1).and_then(|place| self.objects.get(place).copied().flatten()))
     }
 }
 

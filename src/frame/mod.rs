@@ -362,3 +362,10 @@ pub fn extent(object: &Object) -> f64 {
     let (min, max) = shape::bounds(object);
     (max - min).max_element()
 }
+
+/// A ball in which an object certainly lies: its centre in the world, and its radius, scene units.
+pub fn ball(object: &Object) -> (DVec3, f64) {
+    let (min, max) = shape::bounds(object);
+    let (_, rotation, translation) = object.transform.world_from_object().to_scale_rotation_translation();
+    (translation + rotation * (0.5 * (min + max)), 0.5 * min.distance(max))
+}

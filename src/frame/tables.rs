@@ -94,6 +94,18 @@ uniform! {
     }
 }
 
+uniform! {
+    pub struct Display {
+        /// 2 to the power of the exposure.
+        pub gain: f32,
+        pub tone: u32,
+    }
+}
+
+pub const CLAMP: u32 = 0;
+pub const SRGB: u32 = 1;
+pub const FILMIC: u32 = 2;
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,7 +4,7 @@ use super::texture::{Pool, Shape, Texture};
 use crate::problem::{Cause, Problem, nearest};
 use crate::store::{Key, Run};
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
 
 /// What kind of pipeline a pass needs is known when it runs; each is made once.
@@ -24,6 +24,8 @@ pub struct Gpu {
     pub(super) pool: Pool,
     pub(super) pipelines: Mutex<HashMap<Key, Pipeline>>,
     errors: Arc<Mutex<Vec<String>>>,
+    /// Why the device is gone, once it is.
+    gone: Arc<OnceLock<String>>,
     has_timestamps: bool,
 }
 
@@ -38,7 +40,11 @@ fn instance() -> wgpu::Instance {
 
 /// All adapters of this machine, hardware first.
 pub fn adapters() -> Vec<wgpu::Adapter> {
-    let mut found = pollster::block_on(instance().enumerate_adapters(wgpu::Backends::PRIMARY));
+    adapters_of(&instance())
+}
+
+fn adapters_of(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
+    let mut found = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
     found.sort_by_key(|adapter| match adapter.get_info().device_type {
         wgpu::DeviceType::DiscreteGpu => 0,
         wgpu::DeviceType::IntegratedGpu => 1,
@@ -63,24 +69,51 @@ pub fn how_to_get_an_adapter() -> &'static str {
 impl Gpu {
     /// Opens the adapter whose name contains `wanted`, or the best one.
     pub fn open(wanted: Option<&str>) -> Result<Gpu, Problem> {
-        let adapters = adapters();
+        Gpu::open_one(adapters(), wanted)
+    }
+
+    /// Opens an adapter that can draw to a window, and the surface of that window.
+    pub fn open_for(
+        window: impl Into<wgpu::SurfaceTarget<'static>>,
+        wanted: Option<&str>,
+    ) -> Result<(Gpu, wgpu::Surface<'static>, wgpu::SurfaceCapabilities), Problem> {
+        let instance = instance();
+        let cannot = |why: &str| {
+            Problem::new(Cause::Adapter, format!("the window cannot be drawn to: {why}"))
+                .hint("`diaphane doctor` lists the adapters; `diaphane render` makes pictures without a window")
+        };
+        let surface = instance.create_surface(window).map_err(|error| cannot(&error.to_string()))?;
+        let all = adapters_of(&instance);
+        let none_at_all = all.is_empty();
+        let mut able: Vec<_> = all.into_iter().filter(|adapter| adapter.is_surface_supported(&surface)).collect();
+        if able.is_empty() && !none_at_all {
+            return Err(cannot("no adapter can"));
+        }
+        let place = Gpu::choose(&able, wanted)?;
+        let adapter = able.swap_remove(place);
+        let capabilities = surface.get_capabilities(&adapter);
+        Ok((Gpu::open_one(vec![adapter], None)?, surface, capabilities))
+    }
+
+    /// The place of the adapter whose name contains `wanted`, or of the best one.
+    fn choose(adapters: &[wgpu::Adapter], wanted: Option<&str>) -> Result<usize, Problem> {
         if adapters.is_empty() {
             return Err(Problem::new(Cause::Adapter, "there is no graphics adapter").hint(how_to_get_an_adapter()));
         }
         let names: Vec<String> = adapters.iter().map(|adapter| adapter.get_info().name).collect();
-        let place = match wanted {
-            None => 0,
-            Some(wanted) => {
-                let lower = wanted.to_lowercase();
-                names.iter().position(|name| name.to_lowercase().contains(&lower)).ok_or_else(|| {
-                    let near = nearest(wanted, names.iter().map(String::as_str));
-                    let all = names.join("`, `");
-                    Problem::new(Cause::Adapter, format!("there is no adapter `{wanted}`"))
-                        .hint(near.map_or(format!("there is `{all}`"), |near| format!("did you mean `{near}`?")))
-                })?
-            }
-        };
-        let adapter = &adapters[place];
+        let Some(wanted) = wanted else { return Ok(0) };
+        let lower = wanted.to_lowercase();
+        names.iter().position(|name| name.to_lowercase().contains(&lower)).ok_or_else(|| {
+            let near = nearest(wanted, names.iter().map(String::as_str));
+            let all = names.join("`, `");
+            Problem::new(Cause::Adapter, format!("there is no adapter `{wanted}`"))
+                .hint(near.map_or(format!("there is `{all}`"), |near| format!("did you mean `{near}`?")))
+        })
+    }
+
+    fn open_one(adapters: Vec<wgpu::Adapter>, wanted: Option<&str>) -> Result<Gpu, Problem> {
+        let adapter = &adapters[Gpu::choose(&adapters, wanted)?];
+        let info = adapter.get_info();
         let wanted_features = wgpu::Features::TIMESTAMP_QUERY;
         let features = adapter.features() & wanted_features;
         // WebGPU's own limits, but for what large scenes and pictures need: as much as the adapter has.
@@ -98,7 +131,7 @@ impl Gpu {
             ..Default::default()
         }))
         .map_err(|error| {
-            Problem::new(Cause::Adapter, format!("the adapter `{}` cannot be opened: {error}", names[place]))
+            Problem::new(Cause::Adapter, format!("the adapter `{}` cannot be opened: {error}", info.name))
                 .hint("try another one with --adapter; `diaphane doctor` lists them")
         })?;
         let errors: Arc<Mutex<Vec<String>>> = Arc::default();
@@ -106,20 +139,31 @@ impl Gpu {
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             log.lock().expect("no panic while noting an error").push(error.to_string());
         }));
+        let gone: Arc<OnceLock<String>> = Arc::default();
+        let told = gone.clone();
+        device.set_device_lost_callback(move |_, why| {
+            told.set(why).ok(); // the first reason stands
+        });
         Ok(Gpu {
             device,
             queue,
-            adapter: adapter.get_info(),
+            adapter: info,
             timed: false,
             pool: Pool::default(),
             pipelines: Mutex::default(),
             errors,
+            gone,
             has_timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
         })
     }
 
     pub fn is_software(&self) -> bool {
         is_software(&self.adapter)
+    }
+
+    /// Whether the device is gone: a driver crashed, or the card was unplugged. Whoever still needs it opens another one.
+    pub fn is_lost(&self) -> bool {
+        self.gone.get().is_some()
     }
 
     pub fn texture(&self, shape: Shape) -> Texture {
@@ -208,6 +252,9 @@ impl Gpu {
 
     /// What the device has complained of since it was last asked.
     pub fn check(&self, name: &str) -> Result<(), Problem> {
+        if let Some(why) = self.gone.get() {
+            return Err(lost(why));
+        }
         let errors = std::mem::take(&mut *self.errors.lock().expect("no panic while noting an error"));
         match errors.first() {
             None => Ok(()),

@@ -62,6 +62,7 @@ pub struct Shaders {
     folder: Option<PathBuf>,
     files: Arc<Files>,
     known: Mutex<Known>,
+    standing_in: Option<Mutex<StandIns>>,
 }
 
 #[derive(Default)]
@@ -72,10 +73,28 @@ struct Known {
     loaded: HashMap<String, Vec<(Vec<String>, Result<Shader, Problem>)>>,
 }
 
+/// The last good shader for each name with its flags, and the first problem of one that it stood in for.
+#[derive(Default)]
+struct StandIns {
+    good: HashMap<Key, Shader>,
+    trouble: Option<Problem>,
+}
+
 impl Shaders {
     /// Shaders from `folder`, or those that the program carries.
     pub fn new(folder: Option<PathBuf>, files: Arc<Files>) -> Shaders {
-        Shaders { folder, files, known: Mutex::default() }
+        Shaders { folder, files, known: Mutex::default(), standing_in: None }
+    }
+
+    /// From now on a shader that cannot be loaded any more is replaced by its last good self, so that a picture can be
+    /// looked at while somebody mends it; [`Shaders::trouble`] says what is wrong.
+    pub fn with_stand_ins(self) -> Shaders {
+        Shaders { standing_in: Some(Mutex::default()), ..self }
+    }
+
+    /// The first problem that a stand-in covered since this was last asked.
+    pub fn trouble(&self) -> Option<Problem> {
+        self.standing_in.as_ref()?.lock().expect("no panic while standing in").trouble.take()
     }
 
     /// The shader folder that an artist would expect to be read: the one that the environment names, the one here, the
@@ -105,6 +124,24 @@ impl Shaders {
 
     /// The shader `name` (`frame/gbuffer.wgsl`) with all that it includes, and the lines that `flags` ask for.
     pub fn load(&self, name: &str, flags: &[&str]) -> Result<Shader, Problem> {
+        let loaded = self.load_once(name, flags);
+        let Some(standing_in) = &self.standing_in else { return loaded };
+        let mut standing_in = standing_in.lock().expect("no panic while standing in");
+        let role = Key::of(&(name, flags));
+        match loaded {
+            Ok(shader) => {
+                standing_in.good.insert(role, shader.clone());
+                Ok(shader)
+            }
+            Err(problem) => {
+                let good = standing_in.good.get(&role).cloned().ok_or(problem.clone())?;
+                standing_in.trouble.get_or_insert(problem);
+                Ok(good)
+            }
+        }
+    }
+
+    fn load_once(&self, name: &str, flags: &[&str]) -> Result<Shader, Problem> {
         let loaded = |known: &Known| {
             let of_name = known.loaded.get(name)?;
             of_name.iter().find(|(with, _)| with == flags).map(|(_, shader)| shader.clone())
@@ -307,6 +344,22 @@ mod tests {
             ("b.wgsl", "#include \"a.wgsl\"\nconst y = 2;\n"),
         ]);
         cycle.load("a.wgsl", &[]).unwrap();
+    }
+
+    #[test]
+    fn the_last_good_shader_stands_in_for_a_broken_one_until_it_is_mended() {
+        let (folder, plain) = shaders(&[("a.wgsl", "const a = 1;\n")]);
+        let shaders = Shaders::new(Some(folder.path().into()), Arc::default()).with_stand_ins();
+        let write = |text: &str| std::fs::write(folder.path().join("a.wgsl"), text).unwrap();
+        let good = shaders.load("a.wgsl", &[]).unwrap().key;
+        write("const a = oops;\n");
+        assert_eq!(shaders.load("a.wgsl", &[]).unwrap().key, good);
+        assert!(shaders.trouble().unwrap().what.contains("oops") && shaders.trouble().is_none());
+        // Nothing stands in where nobody asked for it, nor for what never was.
+        assert!(plain.load("a.wgsl", &[]).is_err() && shaders.load("a.wgsl", &["NEW"]).is_err());
+        write("const a = 2;\n");
+        assert_ne!(shaders.load("a.wgsl", &[]).unwrap().key, good);
+        assert!(shaders.trouble().is_none());
     }
 
     #[test]

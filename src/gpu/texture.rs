@@ -12,6 +12,8 @@ pub enum Format {
     R32Float,
     Rgba32Uint,
     Rgba8Unorm,
+    /// What most windows are made of.
+    Bgra8Unorm,
     Depth32Float,
 }
 
@@ -24,6 +26,7 @@ impl Format {
             Format::R32Float => wgpu::TextureFormat::R32Float,
             Format::Rgba32Uint => wgpu::TextureFormat::Rgba32Uint,
             Format::Rgba8Unorm => wgpu::TextureFormat::Rgba8Unorm,
+            Format::Bgra8Unorm => wgpu::TextureFormat::Bgra8Unorm,
             Format::Depth32Float => wgpu::TextureFormat::Depth32Float,
         }
     }
@@ -33,7 +36,7 @@ impl Format {
             Format::Rgba32Float | Format::Rgba32Uint => 16,
             Format::Rgba16Float => 8,
             Format::R16Float => 2,
-            Format::R32Float | Format::Rgba8Unorm | Format::Depth32Float => 4,
+            Format::R32Float | Format::Rgba8Unorm | Format::Bgra8Unorm | Format::Depth32Float => 4,
         }
     }
 
@@ -43,7 +46,7 @@ impl Format {
 
     /// Whether every device can filter it; a 32-bit float is read texel by texel.
     pub fn is_filterable(self) -> bool {
-        matches!(self, Format::Rgba16Float | Format::R16Float | Format::Rgba8Unorm)
+        matches!(self, Format::Rgba16Float | Format::R16Float | Format::Rgba8Unorm | Format::Bgra8Unorm)
     }
 }
 

@@ -79,6 +79,7 @@ struct Worn {
 
 impl Step for Worn {
     type Output = Mesh;
+    const NEEDS_HOST: bool = false;
     fn name(&self) -> &'static str {
         "geometry.worn"
     }
@@ -192,6 +193,7 @@ struct Quad {
 
 impl Step for Quad {
     type Output = Mesh;
+    const NEEDS_HOST: bool = false;
     fn name(&self) -> &'static str {
         "geometry.quad"
     }

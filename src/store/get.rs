@@ -49,6 +49,9 @@ pub trait Watch: Sync {
 struct Nobody;
 impl Watch for Nobody {}
 
+/// Values on their way from one store to another.
+pub struct Values(Vec<(Key, Value)>);
+
 /// Values by name. A value stays in memory as long as one of the last few plans names it: not by when it was touched,
 /// since a value behind a hit is never touched, and is exactly what the next edit needs.
 pub struct Store {
@@ -123,13 +126,40 @@ impl Store {
 
     /// Makes every bake of a plan that is not there yet, with whatever it reads; passes stay unmade, so no host is needed.
     pub fn bake(&mut self, plan: &Plan, watch: &dyn Watch) -> Result<(), Problem> {
+        let bakes = (0..plan.steps().len() as u32).filter(|i| plan.steps()[*i as usize].is_bake());
+        self.bake_each(plan, bakes, watch)
+    }
+
+    /// Makes the steps at these places of a plan, which need no host, with whatever they read.
+    pub fn bake_each(
+        &mut self,
+        plan: &Plan,
+        places: impl IntoIterator<Item = u32>,
+        watch: &dyn Watch,
+    ) -> Result<(), Problem> {
         self.remember(plan);
-        for (index, step) in plan.steps().iter().enumerate() {
-            if step.is_bake() {
-                self.make(plan, index as u32, None, watch)?;
-            }
-        }
-        Ok(())
+        places.into_iter().try_for_each(|place| self.make(plan, place, None, watch))
+    }
+
+    /// What asking for `slot` would make, or read from disk, and what needs no host for it: places in the plan, in order.
+    /// Another store can make them on another thread, and this one [adopt](Store::adopt) them.
+    pub fn missing_without_host<T>(&self, plan: &Plan, slot: Slot<T>) -> Vec<u32> {
+        let missing = |(place, state): (usize, State)| {
+            let elsewhere = state.needed && state.origin != Origin::Memory && !plan.steps()[place].needs_host();
+            elsewhere.then_some(place as u32)
+        };
+        self.states(plan, slot).into_iter().enumerate().filter_map(missing).collect()
+    }
+
+    /// All values of a plan that are in memory.
+    pub fn held(&self, plan: &Plan) -> Values {
+        Values(plan.keys().filter_map(|key| Some((key, self.values.get(&key)?.clone()))).collect())
+    }
+
+    /// Takes over what another store holds of a plan. Nothing is copied.
+    pub fn adopt(&mut self, plan: &Plan, values: Values) {
+        self.remember(plan);
+        self.values.extend(values.0);
     }
 
     /// Whether a step's value is in memory by now; it may have come from disk.

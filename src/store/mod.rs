@@ -15,7 +15,7 @@ mod run;
 pub use disk::{Disk, Entry, Swept};
 pub use files::{File, Files};
 pub use follow::Follow;
-pub use get::{Finished, Origin, State, Store, Watch};
+pub use get::{Finished, Origin, State, Store, Values, Watch};
 pub use key::Key;
 pub use plan::{Bake, Plan, PlannedStep, Skipped, Slot, Step};
 pub use run::{Cancel, Run};

@@ -58,6 +58,10 @@ pub trait Step: Serialize + Send + Sync + 'static {
     /// What it makes, for `explain`: half a sentence.
     fn about(&self) -> String;
     fn run(&self, run: &Run) -> Result<Self::Output, Problem>;
+
+    /// Whether `run` asks for the host. What does not, and reads nothing that does, can be made on another thread while an
+    /// older picture is looked at. No bake needs it, whatever is said here.
+    const NEEDS_HOST: bool = true;
 }
 
 /// A step whose value is bytes, kept on disk.
@@ -125,6 +129,7 @@ pub struct PlannedStep {
     /// The places of what it reads, all before its own.
     pub inputs: Vec<u32>,
     pub(super) source: Source,
+    needs_host: bool,
 }
 
 impl PlannedStep {
@@ -133,6 +138,10 @@ impl PlannedStep {
     }
     pub fn is_given(&self) -> bool {
         matches!(self.source, Source::Given(_))
+    }
+    /// Whether it is for the thread that holds the host to make.
+    pub fn needs_host(&self) -> bool {
+        self.needs_host
     }
 }
 
@@ -186,6 +195,7 @@ impl Plan {
             key,
             inputs: Vec::new(),
             source: Source::Given(value),
+            needs_host: false,
         });
         Slot { index, key, value: PhantomData }
     }
@@ -232,6 +242,7 @@ impl Plan {
             key,
             inputs,
             source: source(Box::new(move |run| step.run(run).map(|value| Arc::new(value) as Value))),
+            needs_host: S::NEEDS_HOST && code.is_none(),
         });
         Slot { index, key, value: PhantomData }
     }

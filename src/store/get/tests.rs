@@ -210,3 +210,53 @@ fn a_folder_that_cannot_be_written_is_one_warning() {
     let warnings = log.1.lock().unwrap().clone();
     assert_eq!(warnings.iter().filter(|w| w.contains("cannot be kept")).count(), 1, "{warnings:?}");
 }
+
+/// A text that only the host can write.
+#[derive(serde::Serialize)]
+struct Write(Slot<i64>);
+impl Step for Write {
+    type Output = String;
+    fn name(&self) -> &'static str {
+        "test.write"
+    }
+    fn about(&self) -> String {
+        "a text of the host".into()
+    }
+    fn run(&self, run: &Run) -> Result<String, Problem> {
+        Ok(format!("{}{}", run.host::<&str>(), run.get(self.0)))
+    }
+}
+
+#[test]
+fn another_thread_makes_what_needs_no_host_and_hands_it_over() {
+    let mut plan = Plan::default();
+    let a = plan.bake(Add { to: vec![], what: 1 });
+    let b = plan.bake(Add { to: vec![a], what: 2 });
+    plan.bake(Add { to: vec![a], what: 13 }); // nobody asks for it
+    let text = plan.add(Write(b));
+    let log = Log::default();
+    let mut here = Store::in_memory();
+    let missing = here.missing_without_host(&plan, text);
+    assert_eq!(missing, [0, 1]);
+    let (plan, values) = std::thread::spawn(move || {
+        let mut there = Store::in_memory();
+        there.bake_each(&plan, missing, &Nobody).unwrap();
+        let values = there.held(&plan);
+        (plan, values)
+    })
+    .join()
+    .unwrap();
+    here.adopt(&plan, values);
+    assert!(here.missing_without_host(&plan, text).is_empty());
+    assert_eq!(*here.get_with(&plan, text, Some(&"= "), &log).unwrap(), "= 3");
+    assert_eq!(log.took(), ran(&["a text of the host"]));
+}
+
+#[test]
+fn what_is_on_disk_is_work_for_another_thread_too_but_not_what_it_was_made_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, text) = chain(1);
+    Store::on_disk(Disk::new(folder.path())).bake(&plan, &Nobody).unwrap();
+    assert_eq!(Store::on_disk(Disk::new(folder.path())).missing_without_host(&plan, text), [2]);
+    assert_eq!(Store::in_memory().missing_without_host(&plan, text), [0, 1, 2]);
+}

@@ -1,0 +1,557 @@
+//! The event loop: what happens when. The only place that knows winit.
+
+use super::channel::{Channel, Order};
+use super::overlay::{self, Said, Waits};
+use super::pace::{Pace, Times};
+use super::panel::{self, Facts, Panel, Wish};
+use super::screen::{Painting, Screen};
+use super::stage::{Drawn, Stage, Viewing};
+use super::worker::{News, Reading, Tell};
+use super::{Asked, Subject};
+use crate::gpu::Shaders;
+use crate::image::Display;
+use crate::problem::{Cause, Problem, Problems};
+use crate::render;
+use crate::scene::{Camera, Reader, TechniqueText};
+use crate::store::{Files, Finished, Follow, Key, Origin};
+use serde_json::{Value, json};
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+use winit::application::ApplicationHandler;
+use winit::dpi::{LogicalSize, PhysicalSize, Size};
+use winit::event::{StartCause, WindowEvent};
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
+use winit::window::WindowId;
+
+/// How long a note stays.
+const NOTE: Duration = Duration::from_secs(5);
+
+/// What other threads bring.
+enum Brought {
+    News(News),
+    /// Some file may have changed.
+    Files,
+    Order(Order),
+    Close,
+}
+
+/// As the files and flags say; what hands changed stands until these change.
+#[derive(Clone, PartialEq)]
+pub(super) struct Base {
+    pub camera: Camera,
+    technique: TechniqueText,
+    time_s: f64,
+    display: Display,
+}
+
+impl Base {
+    fn of(subject: &Subject) -> Base {
+        let look = &subject.look;
+        let settings = &subject.scene.view;
+        Base {
+            camera: look.view.camera,
+            technique: look.technique.clone(),
+            time_s: look.view.time_s,
+            display: Display { tone: settings.tone, exposure_ev: settings.exposure_ev as f32 },
+        }
+    }
+}
+
+/// All that the window is.
+pub(super) struct Preview {
+    pub path: PathBuf,
+    adapter: Option<String>,
+    size: Size,
+    pub channel: Channel,
+    pub stage: Stage,
+    reading: Reading,
+    reads: bool,
+    files: Arc<Files>,
+    follow: Follow,
+    egui: egui::Context,
+    input: Option<egui_winit::State>,
+    pub screen: Option<Screen>,
+    pub panel: Panel,
+    pub base: Option<Base>,
+    pub viewing: Viewing,
+    /// The picture's place, pixels.
+    pub place: (u32, u32),
+    pub pace: Pace,
+    times: Times,
+    drawn: Option<Drawn>,
+    /// What the worker made since the last picture.
+    made: Vec<Finished>,
+    warnings: Vec<Problem>,
+    /// A choice that is not possible with this scene.
+    pub refused: Problems,
+    /// The problems that were told last.
+    told: Problems,
+    pub note: Option<(Instant, String)>,
+    /// When it began, and the scene's time then.
+    pub playing: Option<(Instant, f64)>,
+    pub capture: Option<PathBuf>,
+    told_picture: Option<Key>,
+    told_waiting: bool,
+    pub frames: u64,
+    /// Whether the device was opened anew and has drawn nothing yet.
+    rebuilt: bool,
+    next: Option<Instant>,
+    end: Option<Problem>,
+}
+
+/// Opens the window, and stays until it is closed.
+pub fn open(asked: Asked) -> Result<(), Problem> {
+    let no_window = |error: &dyn std::fmt::Display| {
+        Problem::new(Cause::Adapter, format!("no window can be opened: {error}")).hint(
+            "a window needs a desktop; `diaphane render SCENE -o OUT.png` makes a picture without one, and under \
+             `xvfb-run` there is a desktop that nobody sees",
+        )
+    };
+    let event_loop = EventLoop::with_user_event().build().map_err(|error| no_window(&error))?;
+    let proxy = event_loop.create_proxy();
+    let interrupted = event_loop.create_proxy();
+    // A second handler cannot be set; the first serves. The window may be gone by then.
+    ctrlc::set_handler(move || drop(interrupted.send_event(Brought::Close))).ok();
+    let mut preview = Preview::new(asked, move |brought| drop(proxy.send_event(brought)));
+    event_loop.run_app(&mut preview).map_err(|error| no_window(&error))?;
+    preview.channel.say("closed", json!({ "frames": preview.frames }));
+    match preview.end {
+        Some(problem) => Err(problem),
+        None => Ok(()),
+    }
+}
+
+impl Preview {
+    fn new(asked: Asked, bring: impl Fn(Brought) + Clone + Send + 'static) -> Preview {
+        let files = Arc::<Files>::default();
+        let shaders = Shaders::new(Shaders::usual_folder(), files.clone()).with_stand_ins();
+        let reader = Reader::new(files.clone());
+        let Asked { options, scene, look, size, json } = asked;
+        let channel = Channel { open: json };
+        let sender = Mutex::new(bring.clone());
+        let tell: Tell = Arc::new(move |news| {
+            sender.lock().expect("nobody panics while telling")(Brought::News(news));
+        });
+        let (path, sets, read_files) = (scene.clone(), options.sets.clone(), files.clone());
+        let read = move || {
+            read_files.forget();
+            let (scene, warnings) = reader.scene(&path, &sets)?;
+            let look = look(&scene)?;
+            Ok((Subject { scene: Arc::new(scene), look }, warnings))
+        };
+        let orders = bring.clone();
+        channel.listen(move |order| orders(Brought::Order(order)));
+        Preview {
+            reading: Reading::start(read, tell.clone()),
+            reads: false,
+            files,
+            follow: Follow::new(move || bring(Brought::Files)),
+            adapter: options.adapter.clone(),
+            size: match size {
+                Some((width, height)) => PhysicalSize::new(width, height).into(),
+                None => LogicalSize::new(1280, 720).into(),
+            },
+            channel,
+            stage: Stage::new(options, shaders, tell),
+            path: scene,
+            egui: egui::Context::default(),
+            input: None,
+            screen: None,
+            panel: Panel::default(),
+            base: None,
+            viewing: Viewing { camera: Camera::default(), size: (1, 1), display: Display::default() },
+            place: (1, 1),
+            pace: Pace::default(),
+            times: Times::default(),
+            drawn: None,
+            made: Vec::new(),
+            warnings: Vec::new(),
+            refused: Problems::default(),
+            told: Problems::default(),
+            note: None,
+            playing: None,
+            capture: None,
+            told_picture: None,
+            told_waiting: false,
+            frames: 0,
+            rebuilt: false,
+            next: None,
+            end: None,
+        }
+    }
+
+    pub fn redraw_soon(&self) {
+        if let Some(screen) = &self.screen {
+            screen.window.request_redraw();
+        }
+    }
+
+    pub fn read_files(&mut self) {
+        self.reads = true;
+        self.reading.ask();
+    }
+
+    /// What the files hold by now.
+    fn read(&mut self, read: Result<(Subject, Vec<Problem>), Problems>) {
+        self.reads = false;
+        match read {
+            Err(problems) => self.stage.read(problems),
+            Ok((mut subject, warnings)) => {
+                self.stage.read(Problems::default());
+                self.warnings = warnings;
+                self.refused = Problems::default();
+                let base = Base::of(&subject);
+                let old = self.base.replace(base.clone());
+                if old.as_ref().is_none_or(|old| old.camera != base.camera) {
+                    self.viewing.camera = base.camera;
+                }
+                if old.as_ref().is_none_or(|old| old.display != base.display) {
+                    self.viewing.display = base.display;
+                }
+                if let (Some(old), Some(now)) = (old, self.stage.subject()) {
+                    if old.technique == base.technique {
+                        subject.look.technique = now.look.technique.clone();
+                    }
+                    if old.time_s == base.time_s {
+                        subject.look.view.time_s = now.look.view.time_s;
+                    }
+                    if now.scene == subject.scene {
+                        subject.scene = now.scene.clone();
+                    }
+                }
+                // A technique that was chosen by hand may be impossible by now.
+                if let Err(problems) = render::check(&subject.scene, &subject.look.technique) {
+                    self.refused = problems;
+                    subject.look.technique = base.technique;
+                }
+                self.stage.want(subject);
+            }
+        }
+        self.stage.name_files();
+        self.follow.depend_on(&self.files);
+        self.redraw_soon();
+    }
+
+    fn hear(&mut self, news: News) {
+        match news {
+            News::Read(read) => self.read(read),
+            news => {
+                self.made.extend(self.stage.hear(news));
+                self.redraw_soon();
+            }
+        }
+    }
+
+    /// Everything that lives on the device, once more: it was lost. The second time in a row it is given up.
+    fn rebuild(&mut self, event_loop: &ActiveEventLoop, why: Problem) {
+        let screen = self.screen.take();
+        let window = screen.as_ref().map(|screen| screen.window.clone());
+        // What the old device holds has to go before the window gets another surface.
+        self.drawn = None;
+        self.stage.forget_device();
+        drop(screen);
+        if self.rebuilt {
+            return self.give_up(event_loop, why);
+        }
+        self.rebuilt = true;
+        let Some(window) = window else { return };
+        match self.set_up(window) {
+            Ok(()) => self.channel.say("rebuilt", json!({ "problems": [why.json()] })),
+            Err(problem) => self.give_up(event_loop, problem),
+        }
+    }
+
+    fn give_up(&mut self, event_loop: &ActiveEventLoop, problem: Problem) {
+        self.end = Some(problem);
+        event_loop.exit();
+    }
+
+    /// Device, surface and panel for a window.
+    fn set_up(&mut self, window: Arc<winit::window::Window>) -> Result<(), Problem> {
+        let screen = Screen::open(window.clone(), self.adapter.as_deref())?;
+        // The panel's textures live on the device.
+        self.egui = egui::Context::default();
+        self.egui.set_theme(egui::Theme::Dark);
+        self.input = Some(egui_winit::State::new(
+            self.egui.clone(),
+            egui::ViewportId::ROOT,
+            &window,
+            Some(window.scale_factor() as f32),
+            None,
+            Some(screen.gpu.device.limits().max_texture_dimension_2d as usize),
+        ));
+        self.screen = Some(screen);
+        self.told_picture = None;
+        window.request_redraw();
+        Ok(())
+    }
+
+    /// One frame, if the window has pixels.
+    fn redraw(&mut self, event_loop: &ActiveEventLoop) {
+        let Some(mut screen) = self.screen.take() else { return };
+        if screen.size().is_none() {
+            self.screen = Some(screen);
+            return;
+        }
+        let drawn = self.frame(&mut screen);
+        let lost = screen.gpu.is_lost();
+        self.screen = Some(screen);
+        match drawn {
+            Ok(()) if !lost => self.tell_problems(),
+            Ok(()) => self.rebuild(event_loop, Problem::new(Cause::Unfinished, "the device was lost")),
+            Err(problem) => self.rebuild(event_loop, problem),
+        }
+    }
+
+    fn frame(&mut self, screen: &mut Screen) -> Result<(), Problem> {
+        // The device says only to those who ask that it is gone.
+        screen.gpu.device.poll(wgpu::PollType::Poll).ok();
+        screen.gpu.check("the window")?;
+        self.frames += 1;
+        let now = Instant::now();
+        self.play(now);
+        let (mut painting, wishes, repaint) = self.lay_out(screen);
+        wishes.into_iter().for_each(|wish| self.grant(wish, screen));
+        screen.gpu.timed = self.panel.timed && self.panel.shown;
+        self.draw(screen, now);
+        let rest = self.pace.rest(Instant::now());
+        self.next = [rest, repaint].into_iter().flatten().min();
+        if !screen.present(&mut painting)? {
+            self.next = Some(now + Duration::from_millis(50));
+        }
+        if let Some(file) = self.capture.take() {
+            self.write_capture(screen, &painting, file);
+        }
+        Ok(())
+    }
+
+    fn play(&mut self, now: Instant) {
+        let Some((began, from)) = self.playing else { return };
+        // A frame that is on its way is finished first, or none ever would be.
+        if self.drawn.as_ref().is_none_or(|drawn| drawn.current)
+            && let Some(subject) = self.stage.subject()
+        {
+            let mut subject = subject.clone();
+            subject.look.view.time_s = from + (now - began).as_secs_f64();
+            self.pace.moved(now);
+            self.stage.want(subject);
+            self.redraw_soon();
+        }
+    }
+
+    /// Panel, picture and what is said over it: what to paint, what hands want, and when to do this again by itself.
+    fn lay_out(&mut self, screen: &mut Screen) -> (Painting, Vec<Wish>, Option<Instant>) {
+        self.note.take_if(|(since, _)| since.elapsed() > NOTE);
+        let problems = self.problems();
+        let Some(state) = &mut self.input else { unreachable!("a screen comes with its input") };
+        let input = state.take_egui_input(&screen.window);
+        let current = self.drawn.as_ref().is_some_and(|drawn| drawn.current);
+        let waits = match (current && !self.reads, self.stage.subject()) {
+            (true, _) => None,
+            (false, Some(_)) if !self.reads && problems.0.is_empty() => {
+                Some(Waits::ForStep(self.stage.progress(), self.drawn.is_some()))
+            }
+            (false, None) if problems.0.is_empty() => Some(Waits::ForFiles),
+            _ => None,
+        };
+        let said = Said { problems: &problems, waits, note: self.note.as_ref().map(|(_, note)| note.as_str()) };
+        let home = self.base.as_ref().map(|base| base.camera);
+        let subject = self.stage.subject().cloned();
+        let gpu = &screen.gpu;
+        let adapter = format!("{}{}", gpu.adapter.name, if gpu.is_software() { " (draws on the CPU)" } else { "" });
+        let facts = subject.as_ref().zip(home).map(|(subject, home)| Facts {
+            subject,
+            home,
+            viewing: &self.viewing,
+            drawn: self.drawn.as_ref(),
+            times: &self.times,
+            warnings: &self.warnings,
+            adapter,
+            playing: self.playing.is_some(),
+        });
+        let panel = &mut self.panel;
+        let mut wishes = Vec::new();
+        let mut place = egui::Rect::NOTHING;
+        let (playing, picture) = (self.playing.is_some(), screen.picture);
+        let output = self.egui.run_ui(input, |ui| {
+            wishes.clear();
+            overlay::keys(ui, home.map(Wish::Camera), panel.chosen, playing, &mut wishes);
+            if let Some(facts) = &facts
+                && panel.shown
+                && ui.available_width() >= panel::FITS
+            {
+                egui::Panel::right("panel").exact_size(panel::WIDTH).resizable(false).show(ui, |ui| {
+                    panel.ui(ui, facts, &mut wishes);
+                });
+            }
+            egui::CentralPanel::no_frame().show(ui, |ui| {
+                place = overlay::picture(ui, picture, &said, &mut wishes);
+            });
+        });
+        state.handle_platform_output(&screen.window, output.platform_output);
+        let pixels = place.size() * output.pixels_per_point;
+        self.place = (pixels.x.round().max(1.0) as u32, pixels.y.round().max(1.0) as u32);
+        let again = output.viewport_output.values().map(|viewport| viewport.repaint_delay).min();
+        let repaint = again.and_then(|delay| Instant::now().checked_add(delay));
+        let note = self.note.as_ref().map(|(since, _)| *since + NOTE);
+        let jobs = self.egui.tessellate(output.shapes, output.pixels_per_point);
+        let painting = Painting { jobs, textures: output.textures_delta, pixels_per_point: output.pixels_per_point };
+        (painting, wishes, [repaint, note].into_iter().flatten().min())
+    }
+
+    /// The newest picture that can be had.
+    fn draw(&mut self, screen: &mut Screen, now: Instant) {
+        let share = self.pace.share(now) * self.panel.quality;
+        let side = |pixels: u32| ((pixels as f64 * share).round() as u32).max(1);
+        self.viewing.size = (side(self.place.0), side(self.place.1));
+        let drawn = self.stage.draw(&screen.gpu, &self.viewing);
+        let Some(drawn) = drawn else {
+            self.drawn.iter_mut().for_each(|drawn| drawn.current = false);
+            self.tell_waiting();
+            return;
+        };
+        if !drawn.current {
+            self.tell_waiting();
+        }
+        let old = self.drawn.as_ref().map(|old| (old.key, old.current));
+        if old != Some((drawn.key, drawn.current)) {
+            self.redraw_soon(); // what was laid out before knew nothing of it
+        }
+        if drawn.finished.iter().any(|step| step.origin == Origin::Ran) {
+            self.pace.took(drawn.time, share);
+            self.times.note(&drawn.finished);
+            self.rebuilt = false;
+        }
+        let whole = self.viewing.size == self.place;
+        screen.show(&drawn.picture, whole);
+        if self.told_picture != Some(drawn.key) && self.channel.open {
+            self.told_picture = Some(drawn.key);
+            self.tell_picture(screen, &drawn, whole);
+        }
+        match &mut self.drawn {
+            // The same picture again: what it took is what it took when it was made.
+            Some(old) if old.key == drawn.key => old.current = drawn.current,
+            _ => self.drawn = Some(drawn),
+        }
+    }
+
+    fn tell_picture(&mut self, screen: &Screen, drawn: &Drawn, whole: bool) {
+        self.told_waiting &= !drawn.current;
+        let texture = &drawn.picture.0[0];
+        let Ok(levels) = screen.gpu.read_texture(texture) else { return }; // a lost device is noticed by the next frame
+        let made = std::mem::take(&mut self.made);
+        let of = |origin: Origin| made.iter().filter(|step| step.origin == origin).count();
+        self.channel.say(
+            "drawn",
+            json!({
+                "picture": Key::of_bytes(&levels).to_string(),
+                "width": texture.shape.width,
+                "height": texture.shape.height,
+                "current": drawn.current,
+                "whole": whole,
+                "steps": { "run": drawn.steps.ran, "reused": drawn.steps.reused, "unneeded": drawn.steps.unneeded },
+                "bakes": { "run": of(Origin::Ran), "disk": of(Origin::Disk) },
+                "ms": 1e3 * drawn.time.as_secs_f64(),
+            }),
+        );
+    }
+
+    fn tell_waiting(&mut self) {
+        if let Some(progress) = self.stage.progress()
+            && !std::mem::replace(&mut self.told_waiting, true)
+        {
+            self.channel.say("baking", json!({ "about": progress.about }));
+        }
+    }
+
+    pub fn problems(&self) -> Problems {
+        Problems(self.stage.problems().0.into_iter().chain(self.refused.0.iter().cloned()).collect())
+    }
+
+    fn tell_problems(&mut self) {
+        let problems = self.problems();
+        if problems == self.told {
+            return;
+        }
+        match problems.0.is_empty() {
+            true => self.channel.say("mended", json!({})),
+            false => self.channel.say("problem", json!({ "problems": list(&problems) })),
+        }
+        self.told = problems;
+        self.redraw_soon();
+    }
+}
+
+pub(super) fn list(problems: &Problems) -> Value {
+    problems.0.iter().map(Problem::json).collect()
+}
+
+impl ApplicationHandler<Brought> for Preview {
+    fn resumed(&mut self, event_loop: &ActiveEventLoop) {
+        if self.screen.is_some() {
+            return;
+        }
+        let name = self.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let attributes = winit::window::Window::default_attributes()
+            .with_title(format!("{name} - diaphane"))
+            .with_inner_size(self.size);
+        let window = event_loop.create_window(attributes).map(Arc::new);
+        let set_up = window
+            .map_err(|error| Problem::new(Cause::Adapter, format!("no window can be opened: {error}")))
+            .and_then(|window| self.set_up(window));
+        match set_up {
+            Ok(()) => {
+                if let Some(screen) = &self.screen {
+                    let gpu = &screen.gpu;
+                    let (width, height) = screen.size().unwrap_or_default();
+                    let facts = json!({
+                        "adapter": gpu.adapter.name, "software": gpu.is_software(), "width": width, "height": height,
+                    });
+                    self.channel.say("ready", facts);
+                }
+                self.read_files();
+            }
+            Err(problem) => self.give_up(event_loop, problem),
+        }
+    }
+
+    fn new_events(&mut self, _: &ActiveEventLoop, cause: StartCause) {
+        if matches!(cause, StartCause::ResumeTimeReached { .. }) {
+            self.next = None;
+            self.redraw_soon();
+        }
+    }
+
+    fn user_event(&mut self, event_loop: &ActiveEventLoop, brought: Brought) {
+        match brought {
+            Brought::News(news) => self.hear(news),
+            Brought::Files => {
+                if !self.follow.changed().is_empty() {
+                    self.read_files();
+                }
+            }
+            Brought::Order(Order::Close) | Brought::Close => event_loop.exit(),
+            Brought::Order(order) => self.obey(order),
+        }
+    }
+
+    fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        let (Some(screen), Some(input)) = (&mut self.screen, &mut self.input) else { return };
+        let response = input.on_window_event(&screen.window, &event);
+        match event {
+            WindowEvent::CloseRequested => event_loop.exit(),
+            WindowEvent::RedrawRequested => self.redraw(event_loop),
+            WindowEvent::Resized(size) => {
+                screen.resize(size);
+                self.redraw_soon();
+            }
+            _ if response.repaint => self.redraw_soon(),
+            _ => {}
+        }
+    }
+
+    fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
+        event_loop.set_control_flow(self.next.map_or(ControlFlow::Wait, ControlFlow::WaitUntil));
+    }
+}

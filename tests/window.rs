@@ -1,0 +1,370 @@
+//! The window, on a desktop that nobody sees: files change under it, it is pulled about, its device is lost, and it goes on.
+//!
+//! Nothing here depends on how long something takes: a deadline only passes when nothing happens at all.
+
+#![cfg(all(feature = "preview", target_os = "linux"))]
+
+use serde_json::Value;
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+const DEADLINE: Duration = Duration::from_secs(300);
+
+/// A scene that is drawn in no time.
+fn scene(irradiance: &str) -> String {
+    format!(
+        r#"Scene(
+    version: 1,
+    mm_per_unit: 10,
+    camera: (eye: (0, 0, 6)),
+    bookmarks: {{ "close": (eye: (1, 2, 3)) }},
+    lights: [Directional(name: "sun", direction: (-1, 0, -1), irradiance: {irradiance})],
+    objects: [(name: "ball", mesh: Sphere(radius: 1, subdivisions: 2), material: "stone.ron")],
+    view: (technique: Opaque(), antialias: 1),
+)
+"#
+    )
+}
+
+const MATERIAL: &str = r#"Material(
+    version: 1,
+    medium: Preset("marble"),
+    filter: Neighbours(sigma_tr: 1, radius: 2),
+)
+"#;
+
+/// A desktop, a folder, and a window on a scene in it.
+struct Window {
+    xvfb: Child,
+    child: Child,
+    stdin: ChildStdin,
+    events: Receiver<Value>,
+    seen: Vec<Value>,
+    folder: tempfile::TempDir,
+}
+
+impl Drop for Window {
+    fn drop(&mut self) {
+        for child in [&mut self.child, &mut self.xvfb] {
+            child.kill().ok(); // it may have ended by itself
+            child.wait().ok();
+        }
+    }
+}
+
+/// None, and says so where everybody sees it, when there is no desktop to be had.
+fn window(scene: &str, env: &[(&str, &Path)]) -> Option<Window> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("work")).unwrap();
+    std::fs::write(folder.path().join("work/scene.ron"), scene).unwrap();
+    std::fs::write(folder.path().join("work/stone.ron"), MATERIAL).unwrap();
+    let xvfb = Command::new("Xvfb")
+        .args(["-displayfd", "1", "-screen", "0", "1024x768x24", "-nolisten", "tcp"])
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn();
+    let Ok(mut xvfb) = xvfb else {
+        // What is printed by the usual words is swallowed when a test passes.
+        std::io::stderr().write_all(b"SKIPPED: no Xvfb, so no window was tried: tools/test installs it\n").unwrap();
+        return None;
+    };
+    let mut display = String::new();
+    BufReader::new(xvfb.stdout.take().unwrap()).read_line(&mut display).unwrap();
+    let mut child = Command::new(assert_cmd::cargo::cargo_bin!("diaphane"))
+        .args(["preview", "work/scene.ron", "--json", "--size", "160x120"])
+        .current_dir(folder.path())
+        .env("DISPLAY", format!(":{}", display.trim()))
+        .env("DIAPHANE_CACHE", folder.path().join("cache"))
+        .env("NODEVICE_SELECT", "1")
+        .env_remove("WAYLAND_DISPLAY")
+        .env_remove("DIAPHANE_SHADERS")
+        .envs(env.iter().copied())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let (sender, events) = channel();
+    let lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    std::thread::spawn(move || {
+        for line in lines.map_while(Result::ok) {
+            let event = serde_json::from_str(&line).unwrap_or_else(|_| panic!("{line:?} is no event"));
+            if sender.send(event).is_err() {
+                break;
+            }
+        }
+    });
+    let stdin = child.stdin.take().unwrap();
+    Some(Window { xvfb, child, stdin, events, seen: Vec::new(), folder })
+}
+
+impl Window {
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, content: &str) {
+        std::fs::write(self.path(name), content).unwrap();
+    }
+
+    fn tell(&mut self, words: &str) {
+        writeln!(self.stdin, "{words}").unwrap();
+    }
+
+    /// The next event for which this holds.
+    #[track_caller]
+    fn until(&mut self, what: &str, holds: impl Fn(&Value) -> bool) -> Value {
+        let began = Instant::now();
+        loop {
+            match self.events.recv_timeout(DEADLINE.saturating_sub(began.elapsed())) {
+                Ok(event) => {
+                    self.seen.push(event.clone());
+                    if holds(&event) {
+                        return event;
+                    }
+                }
+                Err(RecvTimeoutError::Timeout) => panic!("no {what}: {:#?}", self.seen),
+                Err(RecvTimeoutError::Disconnected) => panic!("it ended without {what}: {:#?}", self.seen),
+            }
+        }
+    }
+
+    #[track_caller]
+    fn event(&mut self, name: &str) -> Value {
+        self.until(name, |event| event["event"] == name)
+    }
+
+    /// The next whole picture of what is wanted.
+    #[track_caller]
+    fn picture(&mut self) -> Value {
+        self.until("picture", |event| event["event"] == "drawn" && event["current"] == true && event["whole"] == true)
+    }
+
+    #[track_caller]
+    fn picture_that_is(&mut self, hash: &Value) -> Value {
+        self.until("such picture", |event| event["event"] == "drawn" && event["picture"] == *hash)
+    }
+
+    #[track_caller]
+    fn status(&mut self) -> Value {
+        self.tell("status");
+        self.event("status")
+    }
+
+    #[track_caller]
+    fn close(mut self) -> ExitStatus {
+        self.tell("close");
+        self.event("closed");
+        let began = Instant::now();
+        loop {
+            match self.child.try_wait().unwrap() {
+                Some(status) => return status,
+                None if began.elapsed() > DEADLINE => panic!("it never ended: {:#?}", self.seen),
+                None => std::thread::sleep(Duration::from_millis(10)),
+            }
+        }
+    }
+}
+
+#[test]
+fn edits_show_broken_ones_are_told_and_mended_ones_forgotten() {
+    let Some(mut window) = window(&scene("3"), &[]) else { return };
+    window.event("ready");
+    let first = window.picture();
+    assert_eq!((&first["width"], &first["height"]), (&160.into(), &120.into()));
+
+    window.write("work/scene.ron", &scene("2"));
+    let second = window.picture();
+    assert_ne!(second["picture"], first["picture"]);
+    assert_eq!(second["bakes"]["run"], 0, "light is no part of a shape");
+
+    window.write("work/scene.ron", &scene("-2"));
+    let problem = &window.event("problem")["problems"][0];
+    assert_eq!((problem["line"].as_u64(), problem["severity"].as_str()), (Some(6), Some("error")), "{problem}");
+    assert!(problem["file"].as_str().unwrap().ends_with("scene.ron") && problem["hint"].is_string(), "{problem}");
+    // The last good scene goes on.
+    window.tell("orbit 30 10");
+    assert_ne!(window.picture()["picture"], second["picture"]);
+    window.tell("camera close");
+    window.picture();
+    window.write("work/scene.ron", &scene("2"));
+    window.event("mended");
+
+    // The material is a file too, and may vanish for a while; so may the folder.
+    std::fs::rename(window.path("work/stone.ron"), window.path("stone.ron")).unwrap();
+    assert!(window.event("problem").to_string().contains("stone.ron"));
+    std::fs::rename(window.path("stone.ron"), window.path("work/stone.ron")).unwrap();
+    window.event("mended");
+    std::fs::rename(window.path("work"), window.path("away")).unwrap();
+    window.event("problem");
+    std::fs::rename(window.path("away"), window.path("work")).unwrap();
+    window.event("mended");
+    window.write("work/scene.ron", &scene("1.5"));
+    window.picture();
+    assert!(window.close().success());
+}
+
+#[test]
+fn of_many_edits_the_last_one_wins() {
+    let Some(mut window) = window(&scene("7"), &[]) else { return };
+    let wanted = window.picture()["picture"].clone();
+    window.write("work/scene.ron", &scene("1"));
+    assert_ne!(window.picture()["picture"], wanted);
+    for i in 0..200 {
+        window.write("work/scene.ron", &scene(&format!("1.{i}")));
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    window.write("work/scene.ron", &scene("7"));
+    window.picture_that_is(&wanted);
+    // Nothing older comes after it, and nothing is drawn when nothing happens.
+    let frames = window.status()["frames"].clone();
+    std::thread::sleep(Duration::from_millis(1500));
+    let later = window.status();
+    assert!(later["problems"].as_array().is_some_and(Vec::is_empty), "{later}");
+    assert!(later["frames"].as_u64() <= frames.as_u64().map(|frames| frames + 5), "an idle window draws: {later}");
+    let last = window.seen.iter().rfind(|event| event["event"] == "drawn").unwrap();
+    assert_eq!(last["picture"], wanted);
+    assert!(window.close().success());
+}
+
+#[test]
+fn hands_move_the_camera_and_pictures_are_written_under_free_names() {
+    let Some(mut window) = window(&scene("3"), &[]) else { return };
+    let first = window.picture();
+    window.tell("orbit 40 0");
+    let turned = window.picture();
+    assert_ne!(turned["picture"], first["picture"]);
+    assert_eq!(turned["bakes"]["run"], 0);
+    window.tell("orbit -40 0");
+    window.picture();
+    for words in ["pan 5 5", "zoom 2", "exposure 1", "camera close", "frame ball", "technique FilteredNormals()"] {
+        window.tell(words);
+        window.picture();
+    }
+    window.tell("technique Sorcery()");
+    assert!(window.event("problem").to_string().contains("Sorcery"));
+    window.tell("technique Opaque()");
+    window.event("mended");
+    window.tell("camera nowhere");
+    window.event("refused");
+
+    window.tell("screenshot");
+    let one = window.event("screenshot")["path"].as_str().unwrap().to_string();
+    let kept = std::fs::read(window.path(&one)).unwrap();
+    window.tell("screenshot");
+    let two = window.event("screenshot")["path"].as_str().unwrap().to_string();
+    assert_ne!(one, two);
+    assert!(window.path(&two).is_file() && std::fs::read(window.path(&one)).unwrap() == kept);
+    window.tell("capture all.png");
+    window.event("captured");
+    let all = image::open(window.path("all.png")).unwrap().to_rgb8();
+    assert_eq!(all.dimensions(), (160, 120));
+    // The window shows the levels that the file stores, but for a note at its top.
+    let file = image::load_from_memory(&kept).unwrap().to_rgb8();
+    let far = |y: u32| (0..160).filter(|x| (0..3).any(|c| all[(*x, y)][c].abs_diff(file[(*x, y)][c]) > 1)).count();
+    let (bottom, total) = ((80..120).map(far).sum::<usize>(), (0..120).map(far).sum::<usize>());
+    assert!(bottom == 0 && total < 160 * 60, "{bottom} and {total} pixels differ");
+    assert!(window.close().success());
+}
+
+#[test]
+fn a_window_is_resized_wildly_hidden_and_minimised() {
+    let Some(mut window) = window(&scene("3"), &[]) else { return };
+    let first = window.picture();
+    for round in 0..3 {
+        for size in ["1x1", "300x20", "0x0", "700x500", "17x391", "0x0", "0x0", "2x700", "160x120"] {
+            window.tell(&format!("resize {size}"));
+        }
+        window.tell("hide");
+        window.tell("show");
+        if round == 1 {
+            window.status();
+        }
+    }
+    window.tell("resize 0x0");
+    assert!(window.status()["size"].is_null());
+    window.tell("resize 90x60");
+    window.until("small picture", |event| event["width"] == 90 && event["height"] == 60);
+    window.tell("resize 160x120");
+    window.picture_that_is(&first["picture"]);
+    assert!(window.close().success());
+}
+
+#[test]
+fn a_lost_device_is_opened_again() {
+    let Some(mut window) = window(&scene("3"), &[]) else { return };
+    let first = window.picture();
+    for _ in 0..2 {
+        window.tell("lose-device");
+        window.event("rebuilt");
+        assert_eq!(window.picture()["picture"], first["picture"]);
+    }
+    assert!(window.close().success());
+}
+
+/// Two spheres of so many subdivisions, whose normals are to be filtered.
+fn spheres(subdivisions: u32) -> String {
+    let ball = |name: &str, x: i32| {
+        format!(
+            r#"(name: "{name}", mesh: Sphere(radius: 1, subdivisions: {subdivisions}), material: "stone.ron",
+                transform: (translate: ({x}, 0, 0)))"#
+        )
+    };
+    let one = r#"(name: "ball", mesh: Sphere(radius: 1, subdivisions: 2), material: "stone.ron")"#;
+    scene("3").replace(one, &format!("{}, {}", ball("left", -1), ball("right", 1)))
+}
+
+#[test]
+fn two_million_triangles_are_waited_for_with_open_eyes() {
+    let Some(mut window) = window(&spheres(8), &[]) else { return };
+    window.event("baking");
+    assert!(window.status()["size"].is_array(), "it answers while a bake runs");
+    window.picture();
+    window.tell("orbit 20 5");
+    assert_eq!(window.picture()["bakes"]["run"], 0);
+    assert!(window.close().success());
+}
+
+#[test]
+fn closing_does_not_wait_for_a_bake_and_an_edit_supersedes_it() {
+    let slow = spheres(8).replace("Opaque()", "FilteredNormals()");
+    let Some(mut window) = window(&scene("3"), &[]) else { return };
+    let first = window.picture();
+    window.write("work/scene.ron", &slow);
+    window.event("baking");
+    window.write("work/scene.ron", &scene("2"));
+    assert_ne!(window.picture()["picture"], first["picture"]);
+    window.write("work/scene.ron", &slow);
+    window.event("baking");
+    assert!(window.close().success());
+}
+
+#[test]
+fn a_broken_shader_leaves_the_last_good_one_in_use() {
+    let shaders = tempfile::tempdir().unwrap();
+    fn copy(from: &Path, to: &Path) {
+        std::fs::create_dir_all(to).unwrap();
+        for entry in std::fs::read_dir(from).unwrap().map(Result::unwrap) {
+            match entry.path() {
+                path if path.is_dir() => copy(&path, &to.join(entry.file_name())),
+                path => drop(std::fs::copy(path, to.join(entry.file_name())).unwrap()),
+            }
+        }
+    }
+    copy(&Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders"), shaders.path());
+    let Some(mut window) = window(&scene("3"), &[("DIAPHANE_SHADERS", shaders.path())]) else { return };
+    let first = window.picture();
+    let file = shaders.path().join("frame/compose.wgsl");
+    let good = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, good.replace("fn fragment", "fn fragment oops")).unwrap();
+    let problem = &window.event("problem")["problems"][0];
+    assert!(problem["file"].as_str().unwrap().ends_with("compose.wgsl") && problem["line"].is_u64(), "{problem}");
+    window.tell("orbit 30 0");
+    assert_ne!(window.picture()["picture"], first["picture"]);
+    std::fs::write(&file, good).unwrap();
+    window.event("mended");
+    assert!(window.close().success());
+}
