@@ -37,7 +37,7 @@
 //! | [`papers`] | the bibliography; comments cite its keys | |
 //! | [`optics`] | media, Fresnel, gloss, phase functions, albedo of a half space: scalar f64, mm | |
 //! | [`geometry`] | meshes, shapes, sculptures, rays, filters on vertices | |
-//! | [`store`] | the one mechanism: keys, plans, memory, disk, the door for files | its key is new |
+//! | [`store`] | the one mechanism: keys, plans, memory, disk, the door for files and who follows them | its key is new |
 //! | [`scene`] | RON into a valid [`scene::Scene`]; the only room that knows RON | a file's content changes |
 //! | [`gpu`] | a small vocabulary over wgpu: checked shaders, passes as values | shader, input or size change |
 //! | [`frame`] | what a technique is given, and what follows it | see its own table |

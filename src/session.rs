@@ -62,8 +62,10 @@ impl Session {
         }
     }
 
-    /// A scene with all that it names, and what is to be said of it.
+    /// A scene with all that it names, and what is to be said of it. From here on [`Files::asked`] gathers what a picture of
+    /// it depends on.
     pub fn scene(&self, path: &Path) -> Result<(Scene, Vec<Problem>), Problems> {
+        self.files.forget();
         self.reader.scene(path, &self.options.sets)
     }
 
@@ -80,15 +82,28 @@ impl Session {
     /// The plan for a picture, and the picture.
     pub fn render(&mut self, scene: &Scene, look: &Look, watch: &dyn Watch) -> Result<(Plan, Arc<Image>), Problem> {
         let (plan, picture) = render::plan(scene, look, &self.shaders)?;
+        let image = self.picture(scene, look, &plan, picture, watch)?;
+        Ok((plan, image))
+    }
+
+    /// The picture of a plan that was made for it.
+    pub fn picture(
+        &mut self,
+        scene: &Scene,
+        look: &Look,
+        plan: &Plan,
+        picture: Slot<Image>,
+        watch: &dyn Watch,
+    ) -> Result<Arc<Image>, Problem> {
         self.fits(scene, look)?;
-        let image = self.get(&plan, picture, watch)?;
+        let image = self.get(plan, picture, watch)?;
         if let Some(bad) = image.non_finite() {
             let (x, y) = bad.first;
             let what = format!("{} pixel(s) of the picture hold no number, the first at {x}, {y}", bad.count);
             return Err(Problem::new(Cause::Unfinished, what)
                 .hint("this is a mistake in the program or in a shader that was edited; nothing was written"));
         }
-        Ok((plan, image))
+        Ok(image)
     }
 
     /// That the device's textures hold the picture with all its samples.

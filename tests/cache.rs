@@ -214,6 +214,23 @@ fn only_old_unfinished_files_and_nothing_foreign_is_swept() {
     assert!(files[2].exists() && files[3].exists());
 }
 
+/// A scene with several bakes that take a while, in a folder of its own.
+fn scene() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let objects: String = (0..4)
+        .map(|i| {
+            let x = 3 * i;
+            format!("(mesh: Sphere(radius: 1.{i}, subdivisions: 4), material: \"m.ron\", transform: (translate: ({x}, 0, 0))),")
+        })
+        .collect();
+    std::fs::write(folder.path().join("s.ron"), format!("Scene(version: 1, mm_per_unit: 1.0, objects: [{objects}])"))
+        .unwrap();
+    let material = "Material(version: 1, medium: AlbedoMfp(albedo: (0.99, 0.98, 0.9), mfp: (0.5, 0.4, 0.3)), \
+                    filter: Neighbours(sigma_tr: 2.0, radius: 0.5))";
+    std::fs::write(folder.path().join("m.ron"), material).unwrap();
+    folder
+}
+
 fn diaphane(folder: &Path, words: &[&str]) -> Command {
     let mut command = Command::new(cargo_bin!("diaphane"));
     command.current_dir(folder).args(words).args(["--cache-dir", "bakes"]);
@@ -232,13 +249,62 @@ fn is_sound(folder: &Path) -> usize {
 }
 
 #[test]
+fn a_killed_process_leaves_whole_bakes_and_loses_none() {
+    let scene = scene();
+    let folder = scene.path();
+    let bakes = folder.join("bakes");
+    let mut killed = 0;
+    // One that had done all before it could be killed proves nothing.
+    for _ in 0..40 {
+        let before = paths(&bakes);
+        let mut child = diaphane(folder, &["bake", "s.ron"]).spawn().unwrap();
+        while paths(&bakes).len() == before.len() && child.try_wait().unwrap().is_none() {
+            std::thread::yield_now();
+        }
+        child.kill().unwrap();
+        let finished = child.wait().unwrap().success();
+        is_sound(folder);
+        let after = paths(&bakes);
+        assert!(before.iter().all(|path| after.contains(path)), "a bake was lost");
+        killed += usize::from(!finished);
+        if killed == 4 {
+            break;
+        }
+        if finished {
+            Disk::new(&bakes).clear().unwrap();
+        }
+    }
+    assert_eq!(killed, 4, "it was always too late");
+    let before = paths(&bakes).len();
+    let output = diaphane(folder, &["bake", "s.ron", "--json"]).output().unwrap();
+    let facts: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&facts["from_disk"], output.stderr.len()), (&before.into(), 0), "what was kept is used: {facts}");
+    assert_eq!(is_sound(folder) as u64, facts["bakes"].as_u64().unwrap());
+}
+
+#[test]
+fn two_processes_share_a_folder() {
+    let scene = scene();
+    let both = [(); 2].map(|()| diaphane(scene.path(), &["bake", "s.ron"]).spawn().unwrap());
+    for child in both {
+        let output = child.wait_with_output().unwrap();
+        assert!(output.status.success() && output.stderr.is_empty(), "{}", text(&output));
+    }
+    let count = is_sound(scene.path());
+    let output = diaphane(scene.path(), &["bake", "s.ron", "--json"]).output().unwrap();
+    let facts: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(facts["made"], 0, "{facts}");
+    assert!(count >= 4);
+}
+
+#[test]
 fn broken_bakes_are_told_removed_and_collected_by_words() {
-    let folder = tempfile::tempdir().unwrap();
-    let bakes = folder.path().join("bakes");
+    let scene = scene();
+    let bakes = scene.path().join("bakes");
     ask(Disk::new(&bakes));
     std::fs::write(&paths(&bakes)[0], "not a bake").unwrap();
     let run = |words: &[&str]| {
-        let output = diaphane(folder.path(), words).output().unwrap();
+        let output = diaphane(scene.path(), words).output().unwrap();
         (output.status.code().unwrap(), text(&output))
     };
     let (status, said) = run(&["cache", "verify"]);
@@ -246,10 +312,48 @@ fn broken_bakes_are_told_removed_and_collected_by_words() {
     assert_eq!(paths(&bakes).len(), LENGTHS.len(), "verify alone removes nothing");
     let (status, said) = run(&["cache", "verify", "--remove"]);
     assert!(status == 0 && said.contains("removed"), "{status} {said}");
-    assert_eq!(is_sound(folder.path()), LENGTHS.len() - 1);
+    assert_eq!(is_sound(scene.path()), LENGTHS.len() - 1);
     assert_eq!(run(&["cache", "gc"]).0, 0);
     assert_eq!(paths(&bakes).len(), LENGTHS.len() - 1);
     assert_eq!(run(&["cache", "gc", "--max-size", "0"]).0, 0);
     assert_eq!(paths(&bakes).len(), 0);
     assert_eq!(run(&["cache", "gc", "--max-size", "lots"]).0, 2);
+}
+
+/// Where a folder cannot be made, nor by root.
+#[test]
+fn a_place_that_keeps_nothing_costs_one_warning_and_no_value() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    std::fs::write(&file, "not a folder").unwrap();
+    let mut places = vec![file.clone(), file.join("bakes")];
+    places.extend(Path::new("/proc/version").exists().then(|| "/proc/bakes".into()));
+    for place in places {
+        let (origins, warnings) = ask(Disk::new(&place));
+        assert_eq!(origins, [Origin::Ran; LENGTHS.len()], "{}", place.display());
+        assert!(warnings.len() == 1 && warnings[0].contains("cannot be kept"), "{}: {warnings:?}", place.display());
+    }
+    assert_eq!(std::fs::read(&file).unwrap(), b"not a folder");
+    // The same values where they can be kept, without a word.
+    assert_eq!(ask(Disk::new(folder.path().join("bakes"))).1, Vec::<String>::new());
+}
+
+/// Where no file may grow beyond 512 bytes, writing fails in the middle, as on a full disk.
+#[cfg(unix)]
+#[test]
+fn a_full_disk_leaves_no_half_bake() {
+    let scene = scene();
+    let binary = cargo_bin!("diaphane");
+    let script = format!("trap '' XFSZ; ulimit -f 1; exec '{}' bake s.ron --cache-dir bakes", binary.display());
+    let output = Command::new("sh").args(["-c", &script]).current_dir(scene.path()).output().unwrap();
+    let said = text(&output);
+    assert_eq!(output.status.code(), Some(5), "{said}");
+    assert_eq!(said.matches("cannot be kept").count(), 1, "{said}");
+    is_sound(scene.path());
+    for folder in std::fs::read_dir(scene.path().join("bakes")).unwrap() {
+        for file in std::fs::read_dir(folder.unwrap().path()).unwrap() {
+            let name = file.unwrap().file_name();
+            assert!(!name.to_string_lossy().starts_with("writing-"), "{name:?} was left");
+        }
+    }
 }

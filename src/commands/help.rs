@@ -30,8 +30,7 @@ Exit status:
 `diaphane help COMMAND` says more of each.";
 
 /// Words that will mean something, and what does something like it by now.
-const LATER: [(&str, &str); 5] = [
-    ("watch", "run `diaphane render` after each edit: what did not change comes from the cache"),
+const LATER: [(&str, &str); 4] = [
     ("reference", "`diaphane render SCENE -o OUT.exr` makes a picture by a real-time technique"),
     ("compare", "`diaphane render SCENE -o OUT.exr` writes linear light, for other programs to compare"),
     ("bench", "`diaphane render SCENE -o OUT.png --timings` says what each step took"),

@@ -13,6 +13,7 @@ mod preview;
 mod progress;
 mod render;
 mod techniques;
+mod watch;
 
 use crate::problem::{Cause, Problem, Problems};
 use crate::session::{Options, Session};
@@ -21,6 +22,7 @@ use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::io::{self, ErrorKind, Write};
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 #[derive(Parser)]
 #[command(name = "diaphane", bin_name = "diaphane", version, about = help::ABOUT, long_about = None)]
@@ -56,6 +58,7 @@ struct Global {
 enum Command {
     New(new::New),
     Render(render::Render),
+    Watch(watch::Watch),
     Check(check::Check),
     Explain(explain::Explain),
     Techniques(techniques::Techniques),
@@ -135,12 +138,8 @@ pub fn answer(words: impl IntoIterator<Item = OsString>) -> Said {
     let json = words.global.json;
     match words.run() {
         Ok(answer) => {
-            // Null: all was said while it happened.
-            let facts = match json {
-                true if answer.json.is_null() => String::new(),
-                true => pretty(&answer.json),
-                false => answer.text,
-            };
+            // Null: all there was to say was said as it happened.
+            let facts = if json && !answer.json.is_null() { pretty(&answer.json) } else { answer.text };
             Said { facts, talk: Problems(answer.warnings).to_string(), status: 0 }
         }
         Err(problems) => Said::wrong(&blame(problems), json),
@@ -195,6 +194,7 @@ impl Words {
             Some(Command::Explain(command)) => return command.run(options),
             Some(Command::Render(command)) => command.run(options, &line)?,
             Some(Command::Preview(command)) => return Ok(command.run(options, self.global.json)?),
+            Some(Command::Watch(command)) => command.run(options, self.global.json)?,
             Some(Command::Bake(command)) => command.run(options)?,
             Some(Command::Media(command)) => command.run(options)?,
             Some(Command::Techniques(command)) => command.run()?,
@@ -230,16 +230,21 @@ impl Global {
 fn session(options: Options) -> Session {
     let session = Session::new(options);
     let cancel = session.store.cancel.clone();
+    when_interrupted(move || cancel.cancel());
+    session
+}
+
+/// Has `stop` called when the user interrupts. Who asks twice does not want to wait for a step that looks up rarely.
+fn when_interrupted(stop: impl Fn() + Send + 'static) {
+    let asked = AtomicBool::new(false);
     let interrupted = move || {
-        // Who asks twice does not want to wait for a step that looks up rarely.
-        if cancel.is_cancelled() {
+        if asked.swap(true, Ordering::Relaxed) {
             std::process::exit(Cause::Unfinished.exit_status().into());
         }
-        cancel.cancel();
+        stop();
     };
     // A second handler cannot be set; the first serves.
     ctrlc::set_handler(interrupted).ok();
-    session
 }
 
 /// `1 bake`, `2 bakes`

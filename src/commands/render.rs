@@ -1,7 +1,7 @@
 use super::look::LookFlags;
 use super::progress::{Made, Progress, seconds};
 use super::{Answer, session};
-use crate::image::{Display, Format, write_file};
+use crate::image::{Display, Format, Image, write_file};
 use crate::problem::{Cause, Problem, Problems};
 use crate::render::Look;
 use crate::scene::Scene;
@@ -97,13 +97,7 @@ impl Render {
         let started = Instant::now();
         let progress = Progress::new();
         let (plan, image) = session.render(scene, look, &progress)?;
-        let display = Display { tone: scene.view.tone, exposure_ev: scene.view.exposure_ev as f32 };
-        let text = [
-            ("Software", concat!("diaphane ", env!("CARGO_PKG_VERSION"))),
-            ("diaphane:scene", &Key::of(scene).to_string()),
-            ("diaphane:technique", &look.technique.ron),
-        ];
-        write_file(file, &image.encode(format, display, &text)?)?;
+        write_picture(file, format, scene, look, &image)?;
         let (finished, warnings) = progress.take();
         answer.warnings.extend(warnings);
         let time = started.elapsed();
@@ -123,6 +117,17 @@ impl Render {
     }
 }
 
+/// Writes a picture with what made it.
+pub fn write_picture(file: &Path, format: Format, scene: &Scene, look: &Look, image: &Image) -> Result<(), Problem> {
+    let display = Display { tone: scene.view.tone, exposure_ev: scene.view.exposure_ev as f32 };
+    let text = [
+        ("Software", concat!("diaphane ", env!("CARGO_PKG_VERSION"))),
+        ("diaphane:scene", &Key::of(scene).to_string()),
+        ("diaphane:technique", &look.technique.ron),
+    ];
+    write_file(file, &image.encode(format, display, &text)?)
+}
+
 fn facts(step: &Finished) -> Value {
     json!({
         "name": step.name,
@@ -133,7 +138,8 @@ fn facts(step: &Finished) -> Value {
     })
 }
 
-fn timings(finished: &[Finished]) -> String {
+/// One line a step.
+pub fn timings(finished: &[Finished]) -> String {
     let line = |step: &Finished| {
         let from = if step.origin == Origin::Disk { " (from disk)" } else { "" };
         format!("  {:>10.2} ms  {:<28} {}{from}\n", 1e3 * step.time.as_secs_f64(), step.name, step.about)

@@ -16,6 +16,10 @@ impl Cancel {
     pub fn cancel(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
+    /// Somebody waits again.
+    pub fn reset(&self) {
+        self.0.store(false, Ordering::Relaxed);
+    }
     pub fn is_cancelled(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }

@@ -3,7 +3,8 @@
 use crate::{Desk, NO_ADAPTER};
 use serde_json::Value;
 
-const COMMANDS: [&str; 9] = ["new", "render", "check", "explain", "techniques", "bake", "media", "cache", "doctor"];
+const COMMANDS: [&str; 10] =
+    ["new", "render", "watch", "check", "explain", "techniques", "bake", "media", "cache", "doctor"];
 
 #[test]
 fn without_words_it_says_what_it_is_a_first_session_and_the_rest() {
@@ -85,7 +86,7 @@ fn every_command_speaks_json_and_nothing_else_on_stdout() {
     let wrong: [(&[&str], i32); 9] = [
         (&["frobnicate"], 2),
         (&["render"], 2),
-        (&["watch", "scene.ron"], 2),
+        (&["preview", "scene.ron"], 2),
         (&["render", "scene.ron", "-o", "x.jpg"], 2),
         (&["check", "scene.ron", "nothing.ron"], 1),
         (&["explain", "scene.ron", "--set", "mm_per_unit=NaN"], 2),
@@ -122,8 +123,7 @@ fn a_place_in_a_file_reaches_programs() {
 #[test]
 fn words_for_a_later_version_are_told_apart_from_misspelt_ones() {
     let desk = Desk::new();
-    let later: [&[&str]; 5] = [
-        &["watch", "scene.ron", "-o", "a.png"],
+    let later: [&[&str]; 4] = [
         &["reference", "merge", "a.exr", "-o", "b.exr"],
         &["compare", "a.png", "b.png"],
         &["bench", "scene.ron"],

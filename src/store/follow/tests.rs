@@ -33,11 +33,12 @@ impl Desk {
         fs::rename(self.path(from), self.path(to)).unwrap();
     }
 
-    /// Reads files, and follows them from here on.
+    /// Reads files, and follows them from here on: what happens next is seen only if it is heard of.
     fn read(&mut self, names: &[&str]) {
         self.files.forget();
         names.iter().for_each(|name| drop(self.files.read(&self.path(name))));
         self.follow.depend_on(&self.files);
+        self.follow.changed();
     }
 
     /// Waits until exactly these differ from what was read.
@@ -75,7 +76,7 @@ impl Desk {
 fn both(test: fn(&mut Desk)) {
     for polls in [false, true] {
         let (wake, woken) = channel();
-        let wake = move || drop(wake.send(()));
+        let wake = move || _ = wake.send(());
         let mut follow = if polls { Follow::polling(wake) } else { Follow::new(wake) };
         if polls {
             start_polling(Arc::downgrade(&follow.shared));
@@ -137,32 +138,28 @@ fn touches_reads_and_other_files_are_no_change() {
     });
 }
 
+/// Whoever looks because a file was read, and reads it for that, never ends.
 #[test]
-fn reading_wakes_nobody() {
-    let (wake, woken) = channel();
-    let mut follow = Follow::new(move || drop(wake.send(())));
-    let folder = tempfile::tempdir().unwrap();
-    let [a, b] = ["a", "b"].map(|name| folder.path().join(name));
-    fs::write(&a, "one").unwrap();
-    fs::write(&b, "one").unwrap();
-    let files = Files::default();
-    (0..2).for_each(|_| drop(files.read(&a)));
-    files.read(&b).unwrap();
-    follow.depend_on(&files);
-    let quiet = || {
-        // What was written just before the watch began may still be told of.
-        while woken.recv_timeout(5 * GATHER).is_ok() {}
-    };
-    quiet();
-    follow.changed();
-    (0..3).for_each(|_| drop(fs::read(&a).unwrap()));
-    fs::write(folder.path().join("picture.png"), "own").unwrap();
-    fs::write(&b, "two").unwrap();
-    woken.recv_timeout(DEADLINE).expect("an edit wakes");
-    assert_eq!(follow.changed(), [b]);
-    quiet();
-    assert_eq!(follow.changed().len(), 1);
-    assert!(woken.recv_timeout(10 * GATHER).is_err(), "to look at files is no reason to look at files");
+fn reading_wakes_nobody_nor_do_strangers() {
+    use notify::event::{AccessKind, AccessMode, CreateKind, DataChange, Flag, RemoveKind};
+    let trail = Trail::to([PathBuf::from("/there/is/none")].iter());
+    let event = |kind, path: &str| DebouncedEvent::new(notify::Event::new(kind).add_path(path.into()), Instant::now());
+    let modified = EventKind::Modify(ModifyKind::Data(DataChange::Any));
+    let written = EventKind::Access(AccessKind::Close(AccessMode::Write));
+    for kind in [modified, written, EventKind::Create(CreateKind::Any), EventKind::Remove(RemoveKind::Any)] {
+        assert!(trail.is_met_by(&event(kind, "/there")) && trail.is_met_by(&event(kind, "/THERE")), "{kind:?}");
+        assert!(!trail.is_met_by(&event(kind, "/picture.png")), "{kind:?}");
+    }
+    for mode in [AccessMode::Any, AccessMode::Read] {
+        for kind in [AccessKind::Open(mode), AccessKind::Close(mode), AccessKind::Read] {
+            assert!(!trail.is_met_by(&event(EventKind::Access(kind), "/there")), "{kind:?}");
+        }
+    }
+    let missed = notify::Event::new(EventKind::Other).set_flag(Flag::Rescan);
+    let missed = DebouncedEvent::new(missed, Instant::now());
+    assert!(trail.is_met_by(&missed) && trail.is_moved_by(&missed));
+    assert!(trail.is_moved_by(&event(EventKind::Remove(RemoveKind::Folder), "/")));
+    assert!(!trail.is_moved_by(&event(modified, "/")));
 }
 
 #[test]
@@ -231,6 +228,18 @@ fn folders_may_be_renamed_made_anew_and_renamed_back() {
             desk.write("outer/inner/a", "two");
             desk.sees(&["outer/inner/a"]);
             fs::remove_dir_all(desk.path("elsewhere")).unwrap();
+            // Another with the same content in its place, before anybody looks: the watch went with the first.
+            desk.read(&["outer/inner/a", "b"]);
+            desk.rename(moved, "elsewhere");
+            desk.write("outer/inner/a", "two");
+            desk.sees_nothing_until("b");
+            for round in ["three", "four", "five"] {
+                desk.read(&["outer/inner/a", "b"]);
+                desk.write("outer/inner/a", round);
+                desk.sees(&["outer/inner/a"]);
+            }
+            fs::remove_dir_all(desk.path("elsewhere")).unwrap();
+            fs::remove_file(desk.path("b")).unwrap();
         }
     });
 }
@@ -240,11 +249,11 @@ fn folders_may_be_renamed_made_anew_and_renamed_back() {
 fn links_are_followed_and_may_be_turned() {
     use std::os::unix::fs::symlink;
     both(|desk| {
-        for name in ["first/a", "second/a"] {
+        for name in ["first/a", "second/a", "third/c", "fourth/c"] {
             desk.write(name, name);
         }
         desk.write("here/b", "one");
-        symlink("../first/a", desk.path("here/file")).unwrap();
+        symlink("../third/c", desk.path("here/file")).unwrap();
         symlink("first", desk.path("folder")).unwrap();
         let turn = |desk: &Desk, link: &str, target: &str| {
             symlink(target, desk.path("aside")).unwrap();
@@ -253,14 +262,18 @@ fn links_are_followed_and_may_be_turned() {
         let all = ["folder/a", "here/file"];
         desk.read(&all);
         desk.replace("first/a", "new");
-        desk.sees(&all);
+        desk.sees(&all[..1]);
         desk.read(&all);
-        turn(desk, "here/file", "../second/a");
+        desk.replace("third/c", "new");
+        desk.sees(&all[1..]);
+        desk.read(&all);
+        turn(desk, "here/file", "../fourth/c");
         desk.sees(&["here/file"]);
         turn(desk, "folder", "second");
         desk.sees(&all);
         desk.read(&all);
         desk.write("second/a", "newer");
+        desk.write("fourth/c", "newer");
         desk.sees(&all);
         // Nowhere, and in a circle.
         desk.read(&all);
@@ -289,7 +302,7 @@ fn the_way_to_a_file_is_that_of_the_system() {
 #[test]
 fn a_watch_that_cannot_be_had_is_told_once_and_the_files_are_looked_at() {
     let (wake, woken) = channel();
-    let mut follow = Follow::new(move || drop(wake.send(())));
+    let mut follow = Follow::new(move || _ = wake.send(()));
     follow.poll(&notify::Error::new(notify::ErrorKind::MaxFilesWatch));
     let warning = follow.warning().expect("it is told").to_string();
     assert!(warning.starts_with("warning: ") && warning.contains("twice a second"), "{warning}");
