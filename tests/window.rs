@@ -369,3 +369,24 @@ fn a_broken_shader_leaves_the_last_good_one_in_use() {
     window.event("mended");
     assert!(window.close().success());
 }
+
+#[test]
+fn without_a_desktop_or_a_scene_it_ends_and_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("scene.ron"), scene("3")).unwrap();
+    for (file, status, words) in
+        [("scene.ron", 3, "needs a desktop"), ("no.ron", 1, "no.ron: error: it cannot be read")]
+    {
+        let output = Command::new(assert_cmd::cargo::cargo_bin!("diaphane"))
+            .args(["preview", file])
+            .current_dir(folder.path())
+            .env_remove("DISPLAY")
+            .env_remove("WAYLAND_DISPLAY")
+            .env_remove("WAYLAND_SOCKET")
+            .output()
+            .unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(status), "{said}");
+        assert!(said.contains(words) && said.contains("hint: "), "{said}");
+    }
+}
