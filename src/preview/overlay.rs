@@ -119,7 +119,10 @@ fn bottom(ui: &Ui, rect: Rect, said: &Said) {
     }
     let wrong = said.problems.0.iter().any(|problem| problem.is_error());
     let colour = if wrong { Color32::from_rgb(110, 20, 24) } else { Color32::from_rgb(95, 75, 10) };
-    let area = Area::new(egui::Id::unique("problems")).fixed_pos(rect.left_bottom()).pivot(Align2::LEFT_BOTTOM);
+    let area = Area::new(egui::Id::unique("problems"))
+        .fixed_pos(rect.left_bottom())
+        .pivot(Align2::LEFT_BOTTOM)
+        .default_size(rect.size());
     area.show(ui.ctx(), |ui| {
         plate(colour).show(ui, |ui| {
             let room = Vec2::new(rect.width() - 20.0, 0.5 * rect.height());
