@@ -321,8 +321,9 @@ fn spheres(subdivisions: u32) -> String {
 fn two_million_triangles_are_waited_for_with_open_eyes() {
     let Some(mut window) = window(&spheres(8), &[]) else { return };
     window.event("baking");
-    assert!(window.status()["size"].is_array(), "it answers while a bake runs");
+    window.tell("status");
     window.picture();
+    assert!(window.seen.iter().any(|event| event["event"] == "status") || window.event("status").is_object());
     window.tell("orbit 20 5");
     assert_eq!(window.picture()["bakes"]["run"], 0);
     assert!(window.close().success());
@@ -367,4 +368,25 @@ fn a_broken_shader_leaves_the_last_good_one_in_use() {
     std::fs::write(&file, good).unwrap();
     window.event("mended");
     assert!(window.close().success());
+}
+
+#[test]
+fn without_a_desktop_or_a_scene_it_ends_and_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("scene.ron"), scene("3")).unwrap();
+    for (file, status, words) in
+        [("scene.ron", 3, "needs a desktop"), ("no.ron", 1, "no.ron: error: it cannot be read")]
+    {
+        let output = Command::new(assert_cmd::cargo::cargo_bin!("diaphane"))
+            .args(["preview", file])
+            .current_dir(folder.path())
+            .env_remove("DISPLAY")
+            .env_remove("WAYLAND_DISPLAY")
+            .env_remove("WAYLAND_SOCKET")
+            .output()
+            .unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(status), "{said}");
+        assert!(said.contains(words) && said.contains("hint: "), "{said}");
+    }
 }

@@ -25,7 +25,7 @@ pub struct Reference {
     #[command(subcommand)]
     merge: Option<Words>,
     #[command(flatten)]
-    trace: Option<Trace>,
+    trace: Trace,
 }
 
 #[derive(clap::Subcommand)]
@@ -47,10 +47,12 @@ struct Merge {
 #[derive(clap::Args)]
 struct Trace {
     /// The scene's file
-    scene: PathBuf,
+    // Required, but not by `merge`: so these two are always there when a picture is asked for.
+    #[arg(required = true)]
+    scene: Option<PathBuf>,
     /// Where to: .exr (linear light) or .png
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
+    #[arg(short, long, value_name = "FILE", required = true)]
+    output: Option<PathBuf>,
     #[command(flatten)]
     look: LookFlags,
     /// volume (random walks through the media)
@@ -102,10 +104,9 @@ fn parse_tile(text: &str) -> Result<(u32, u32), String> {
 
 impl Reference {
     pub fn run(self, options: Options) -> Result<Answer, Problems> {
-        match (self.merge, self.trace) {
-            (Some(Words::Merge(merge)), _) => Ok(merge.run()?),
-            (None, Some(trace)) => trace.run(options),
-            (None, None) => unreachable!("one of the two is required"),
+        match self.merge {
+            Some(Words::Merge(merge)) => Ok(merge.run()?),
+            None => self.trace.run(options),
         }
     }
 }
@@ -120,7 +121,8 @@ fn words(what: impl Into<String>, hint: &str) -> Problem {
 impl Trace {
     fn run(self, options: Options) -> Result<Answer, Problems> {
         let started = Instant::now();
-        let format = Format::of(&self.output)?;
+        let (scene, output) = self.scene.as_ref().zip(self.output.as_ref()).expect("both are required");
+        let format = Format::of(output)?;
         if let Some(variance) = &self.variance
             && Format::of(variance)? != Format::Exr
         {
@@ -142,7 +144,7 @@ impl Trace {
             return Err(words("--tile: tiles fit together only with the same samples, unrounded", hint).into());
         }
         let mut session = session(options);
-        let (scene, warnings) = session.scene(&self.scene)?;
+        let (scene, warnings) = session.scene(scene)?;
         let look = self.look.look(&scene)?;
         let part = look.view.part;
         let own = &scene.reference;
@@ -184,7 +186,7 @@ impl Trace {
         }
         let text: Vec<(&str, &str)> = text.iter().map(|(key, value)| (*key, value.as_str())).collect();
         let display = Display { tone: scene.view.tone, exposure_ev: scene.view.exposure_ev as f32 };
-        write_file(&self.output, &picture.encode(format, display, &text)?)?;
+        write_file(output, &picture.encode(format, display, &text)?)?;
         if let Some(file) = &self.variance {
             write_file(file, &film.variance(part).encode(Format::Exr, display, &text)?)?;
         }
@@ -192,7 +194,7 @@ impl Trace {
         let from_disk = finished.iter().filter(|step| step.origin == Origin::Disk).count();
         let (error, time) = (film.relative_standard_error(part), started.elapsed());
         let facts = json!({
-            "path": self.output.display().to_string(),
+            "path": output.display().to_string(),
             "variance": self.variance.as_ref().map(|file| file.display().to_string()),
             "width": film.width,
             "height": film.height,
@@ -213,7 +215,7 @@ impl Trace {
         };
         let line = format!(
             "{}  {} x {}  {}  {}  {} from disk\n",
-            self.output.display(),
+            output.display(),
             film.width,
             film.height,
             level(&film, part),
@@ -266,7 +268,7 @@ impl Merge {
             return Err(words(what, "name all tiles"));
         }
         let text: Vec<(&str, &str)> = first.text.iter().map(|(key, value)| (key.as_str(), value.as_str())).collect();
-        write_file(&self.output, &picture.encode(Format::Exr, Display::default(), &text)?)?;
+        write_file(output, &picture.encode(Format::Exr, Display::default(), &text)?)?;
         let time = started.elapsed();
         let facts = json!({
             "path": self.output.display().to_string(),

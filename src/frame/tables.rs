@@ -141,7 +141,8 @@ mod tests {
         macro_rules! layouts {
             ($($name:ident),*) => { vec![$(of::<$name>(stringify!($name))),*] };
         }
-        let ours = layouts![Camera, Object, Light, Caster, ShadowView, Views, Vertices, Direction, Sky, Resolve];
+        let ours =
+            layouts![Camera, Object, Light, Caster, ShadowView, Views, Vertices, Direction, Sky, Resolve, Display];
         let declared = include_str!("tables.rs").matches("uniform! {").count() - 1; // this line is one more
         assert_eq!(ours.len(), declared, "a struct is missing in the list above");
         let theirs = in_shaders();

@@ -350,7 +350,10 @@ mod tests {
     fn the_last_good_shader_stands_in_for_a_broken_one_until_it_is_mended() {
         let (folder, plain) = shaders(&[("a.wgsl", "const a = 1;\n")]);
         let shaders = Shaders::new(Some(folder.path().into()), Arc::default()).with_stand_ins();
-        let write = |text: &str| std::fs::write(folder.path().join("a.wgsl"), text).unwrap();
+        let write = |text: &str| {
+            std::fs::write(folder.path().join("a.wgsl"), text).unwrap();
+            shaders.look_again();
+        };
         let good = shaders.load("a.wgsl", &[]).unwrap().key;
         write("const a = oops;\n");
         assert_eq!(shaders.load("a.wgsl", &[]).unwrap().key, good);

@@ -4,8 +4,8 @@ use super::panel::Wish;
 use super::worker::Progress;
 use crate::problem::Problems;
 use egui::{
-    Color32, CornerRadius, CursorIcon, Frame, Key, Layout, Margin, PointerButton, ProgressBar, Rect, Response,
-    RichText, ScrollArea, Sense, TextureId, Ui, UiBuilder, Vec2, pos2,
+    Align2, Area, Color32, CornerRadius, CursorIcon, Frame, Key, Layout, Margin, PointerButton, ProgressBar, Rect,
+    Response, RichText, ScrollArea, Sense, TextureId, Ui, UiBuilder, Vec2, pos2,
 };
 use glam::DVec2;
 
@@ -113,19 +113,24 @@ fn top(ui: &mut Ui, rect: Rect, said: &Said) {
     }
 }
 
-fn bottom(ui: &mut Ui, rect: Rect, said: &Said) {
+fn bottom(ui: &Ui, rect: Rect, said: &Said) {
     if said.problems.0.is_empty() {
         return;
     }
-    let mut ui = ui.new_child(UiBuilder::new().max_rect(rect).layout(Layout::bottom_up(egui::Align::Min)));
     let wrong = said.problems.0.iter().any(|problem| problem.is_error());
     let colour = if wrong { Color32::from_rgb(110, 20, 24) } else { Color32::from_rgb(95, 75, 10) };
-    plate(colour).show(&mut ui, |ui| {
-        ui.set_max_size(Vec2::new(rect.width() - 20.0, 0.5 * rect.height()));
-        ScrollArea::both().max_height(0.5 * rect.height()).show(ui, |ui| {
-            // A line of source stands over its marks, so nothing may wrap.
-            let text = RichText::new(said.problems.to_string()).monospace().color(Color32::WHITE);
-            ui.add(egui::Label::new(text).extend().selectable(true));
+    let area = Area::new(egui::Id::unique("problems"))
+        .fixed_pos(rect.left_bottom())
+        .pivot(Align2::LEFT_BOTTOM)
+        .default_size(rect.size());
+    area.show(ui.ctx(), |ui| {
+        plate(colour).show(ui, |ui| {
+            let room = Vec2::new(rect.width() - 20.0, 0.5 * rect.height());
+            ScrollArea::both().max_width(room.x).max_height(room.y).show(ui, |ui| {
+                // A line of source stands over its marks, so nothing may wrap.
+                let text = RichText::new(said.problems.to_string()).monospace().color(Color32::WHITE);
+                ui.add(egui::Label::new(text).extend().selectable(true));
+            });
         });
     });
 }

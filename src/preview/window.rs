@@ -314,8 +314,10 @@ impl Preview {
         let (mut painting, wishes, repaint) = self.lay_out(screen);
         wishes.into_iter().for_each(|wish| self.grant(wish, screen));
         screen.gpu.timed = self.panel.timed && self.panel.shown;
+        // A small picture may take longer than the quiet after which the whole one is due.
+        let small = self.pace.share(now) < 1.0;
         self.draw(screen, now);
-        let rest = self.pace.rest(Instant::now());
+        let rest = small.then(|| self.pace.rest(Instant::now()).unwrap_or_else(Instant::now));
         self.next = [rest, repaint].into_iter().flatten().min();
         if !screen.present(&mut painting)? {
             self.next = Some(now + Duration::from_millis(50));

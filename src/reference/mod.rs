@@ -177,6 +177,7 @@ struct BuildTracer {
 
 impl Step for BuildTracer {
     type Output = Tracer;
+    const NEEDS_HOST: bool = false;
     fn name(&self) -> &'static str {
         "reference.world"
     }
@@ -291,6 +292,7 @@ pub struct Develop {
 
 impl Step for Develop {
     type Output = Image;
+    const NEEDS_HOST: bool = false;
     fn name(&self) -> &'static str {
         "reference.picture"
     }

@@ -103,10 +103,10 @@ fn nothing_is_lost_in_a_white_furnace() {
     let colored = Rgb::new(3.0, 5.0, 8.0);
     for (ior, sigma_s, g, paths) in [
         (1.0, Rgb::splat(4.0), 0.0, 6_000),
-        (1.0, colored, 0.0, 16_000),
+        (1.0, colored, 0.0, 30_000),
         (1.3, Rgb::splat(4.0), 0.6, 6_000),
         (1.5, Rgb::splat(8.0), -0.4, 6_000),
-        (1.5, colored, 0.3, 16_000),
+        (1.5, colored, 0.3, 50_000),
     ] {
         let matter = translucent(ior, 0.0, Rgb::ZERO, sigma_s, g);
         for light in [Light::Direct, Light::Full] {
@@ -157,7 +157,7 @@ fn a_lamp_is_seen_through_a_smooth_boundary() {
             // Two events: into the medium, and the first particle.
             let tracer = tracer(vec![(slab(), matter.clone())], vec![lamp], None, Light::Direct, 2);
             let down = |_: &mut Random| (DVec3::new(0.1, 15.0, 0.2), DVec3::NEG_Y);
-            let measured = measure(&tracer, 30_000, down, |p| p.scattered);
+            let measured = measure(&tracer, 60_000, down, |p| p.scattered);
             agree(&format!("ior {ior}, tilt {tilt}"), measured, Rgb::splat(expected));
         }
     }
