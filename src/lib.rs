@@ -40,6 +40,7 @@
 //! | [`geometry`] | meshes, shapes, sculptures, rays, filters on vertices | |
 //! | [`store`] | the one mechanism: keys, plans, memory, disk, the door for files and who follows them | its key is new |
 //! | [`scene`] | RON into a valid [`scene::Scene`]; the only room that knows RON | a file's content changes |
+//! | [`reference`] | the truth: light followed on the CPU, in f64; needs no device | anything that light could meet changes |
 //! | [`gpu`] | a small vocabulary over wgpu: checked shaders, passes as values | shader, input or size change |
 //! | [`frame`] | what a technique is given, and what follows it | see its own table |
 //! | [`techniques`] | one folder = one paper's way, with its manual | their bakes: shape, medium or kernel change |

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each room uses only those to its left.
-const ROOMS: [&str; 16] = [
+const ROOMS: [&str; 17] = [
     "problem",
     "image",
     "metric",
@@ -13,6 +13,7 @@ const ROOMS: [&str; 16] = [
     "geometry",
     "store",
     "scene",
+    "reference",
     "gpu",
     "frame",
     "techniques",

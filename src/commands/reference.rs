@@ -268,7 +268,7 @@ impl Merge {
             return Err(words(what, "name all tiles"));
         }
         let text: Vec<(&str, &str)> = first.text.iter().map(|(key, value)| (key.as_str(), value.as_str())).collect();
-        write_file(output, &picture.encode(Format::Exr, Display::default(), &text)?)?;
+        write_file(&self.output, &picture.encode(Format::Exr, Display::default(), &text)?)?;
         let time = started.elapsed();
         let facts = json!({
             "path": self.output.display().to_string(),
