@@ -4,6 +4,7 @@ mod comparing;
 mod files;
 mod mistakes;
 mod pictures;
+mod truth;
 mod words;
 
 use assert_cmd::cargo::cargo_bin_cmd;
