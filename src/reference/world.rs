@@ -1,5 +1,6 @@
 //! The scene as rays see it: every triangle of every visible object and area light in world space.
 
+use super::bssrdf::Bssrdf;
 use crate::geometry::bvh::{Bvh, Hit};
 use crate::geometry::mesh::Mesh;
 use crate::optics::Rgb;
@@ -20,6 +21,11 @@ pub enum Matter {
     Translucent {
         surface: Boundary,
         medium: Medium,
+    },
+    /// The same, but light is not followed through it.
+    Bssrdf {
+        surface: Boundary,
+        bssrdf: Bssrdf,
     },
     /// An area light: its place in the scene's list.
     Emitter(usize),
@@ -107,6 +113,12 @@ impl World {
             flat,
             normal,
         }
+    }
+
+    /// Every place where the line through `p` meets one thing, in the line's order; `t` is below 0 behind `p`.
+    pub fn along(&self, thing: usize, p: DVec3, direction: DVec3) -> Vec<Point> {
+        let hits = self.bvh.hits_along(thing as u32, p, direction);
+        hits.into_iter().map(|hit| self.point(p, direction, hit)).collect()
     }
 
     pub fn is_free(&self, origin: DVec3, direction: DVec3, t_max: f64, from: Option<Place>) -> bool {
