@@ -6,11 +6,12 @@
 //! x_i is sought by a line along the normal at x_o or along one of two tangents, at a radius drawn from one channel's
 //! profile [King2013]. Each place where the line meets the thing has a density, that of all axes and channels together
 //! (the balance heuristic). Of these places one is drawn in proportion to R_d over its density, where [Pharr2016, 15.4.2]
-//! draws evenly. Two more things differ from there: neither radii nor lines end, so nothing is cut off; and the line meets
-//! the same thing, not the same material, so that things which touch do not bleed into one another.
+//! draws evenly. More differs from there: neither radii nor lines end, so nothing is cut off; the line meets the same thing,
+//! not the same material, so that things which touch do not bleed into one another; and some lines are laid anywhere
+//! through the thing, since a profile's own radii seldom lead to its far side, from which a lamp behind it shines.
 
 use super::random::Random;
-use super::world::{Point, World};
+use super::world::{Ball, Point, World};
 use crate::optics::Rgb;
 use crate::optics::medium::Medium;
 use crate::optics::phase::Phase;
@@ -40,6 +41,8 @@ pub struct Entry {
 
 /// The chance of each axis: the normal and two tangents.
 const CHANCES: [f64; 3] = [0.5, 0.25, 0.25];
+/// The share of lines that are laid anywhere through the thing.
+const ANYWHERE: f64 = 0.125;
 
 impl Bssrdf {
     /// With coefficients per scene unit, under a boundary of relative index `ior`, 1 or more.
@@ -52,15 +55,19 @@ impl Bssrdf {
         let (x, y) = exit.normal.any_orthonormal_pair();
         let axes = [exit.normal, x, y];
         let axis = [0, 0, 1, 2][random.choice(4)];
-        let radius = self.profiles[random.choice(3)].sample(random.unit())?;
+        let ball = world.balls[exit.thing()];
+        let (center, radius) = match random.unit() < ANYWHERE {
+            true => (ball.center, ball.radius * random.unit().sqrt()),
+            false => (exit.p, self.profiles[random.choice(3)].sample(random.unit())?),
+        };
         let (sin, cos) = (2.0 * PI * random.unit()).sin_cos();
-        let through = exit.p + radius * (cos * axes[(axis + 1) % 3] + sin * axes[(axis + 2) % 3]);
+        let through = center + radius * (cos * axes[(axis + 1) % 3] + sin * axes[(axis + 2) % 3]);
         let mut entries: Vec<Entry> = world
             .along(exit.thing(), through, axes[axis])
             .into_iter()
             .filter_map(|point| {
                 let offset = point.p - exit.p;
-                let density = self.density(axes, offset, point.flat);
+                let density = self.density(axes, offset, point.flat, ball);
                 // At no distance R_d is infinite, and no line comes upon a triangle from its edge: both have no chance.
                 (offset != DVec3::ZERO && density > 0.0).then(|| Entry { point, weight: self.r_d(offset) / density })
             })
@@ -84,7 +91,8 @@ impl Bssrdf {
     }
 
     /// The density per area with which lines along all axes, at radii of all channels, find a place of that normal.
-    fn density(&self, axes: [DVec3; 3], offset: DVec3, normal: DVec3) -> f64 {
+    fn density(&self, axes: [DVec3; 3], offset: DVec3, normal: DVec3, ball: Ball) -> f64 {
+        let anywhere = ANYWHERE / (PI * ball.radius * ball.radius);
         let by_axis = |(axis, chance): (DVec3, f64)| {
             let facing = chance * axis.dot(normal).abs();
             if facing == 0.0 {
@@ -92,7 +100,8 @@ impl Bssrdf {
                 return 0.0;
             }
             let radius = offset.cross(axis).length();
-            facing * self.profiles.iter().map(|profile| profile.pdf(radius)).sum::<f64>() / 3.0
+            let own = self.profiles.iter().map(|profile| profile.pdf(radius)).sum::<f64>() / 3.0;
+            facing * ((1.0 - ANYWHERE) * own + anywhere)
         };
         axes.into_iter().zip(CHANCES).map(by_axis).sum()
     }

@@ -64,6 +64,14 @@ pub struct Thing {
 pub struct World {
     pub bvh: Bvh,
     pub things: Vec<Thing>,
+    /// Around each thing.
+    pub balls: Vec<Ball>,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Ball {
+    pub center: DVec3,
+    pub radius: f64,
 }
 
 /// A triangle of a thing: a ray that starts on it does not meet it again.
@@ -93,7 +101,7 @@ impl World {
     pub fn new(things: Vec<Thing>) -> World {
         let meshes: Vec<(&Mesh, DAffine3)> =
             things.iter().map(|thing| (thing.mesh.as_ref(), thing.world_from_object)).collect();
-        World { bvh: Bvh::new(&meshes), things }
+        World { bvh: Bvh::new(&meshes), balls: things.iter().map(Thing::ball).collect(), things }
     }
 
     /// What a ray meets first within `t_max`, on either side; never the triangle `from` that it starts on.
@@ -127,6 +135,16 @@ impl World {
 }
 
 impl Thing {
+    /// Around the middle of its box. Wide enough for the f32 in which rays see its corners.
+    fn ball(&self) -> Ball {
+        let corners = || self.mesh.positions.iter().map(|p| self.world_from_object.transform_point3(p.as_dvec3()));
+        let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let (min, max) = corners().fold(nothing, |(min, max), p| (min.min(p), max.max(p)));
+        let center = 0.5 * (min + max);
+        let radius = corners().map(|p| p.distance(center)).fold(0.0, f64::max);
+        Ball { center, radius: 1.0001 * radius }
+    }
+
     /// The triangle's outward normal, and the interpolated one on the same side of it; the first for both where the second
     /// vanishes.
     pub fn normals(&self, triangle: usize, b: glam::DVec2) -> (DVec3, DVec3) {
