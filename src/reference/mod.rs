@@ -164,7 +164,7 @@ fn matter(object: &Object, mm_per_unit: f64, integrator: Integrator) -> Matter {
         Integrator::Bssrdf => {
             let medium = medium::Medium { sigma_a, sigma_s, g: medium.g };
             let bssrdf = Bssrdf::new(material.profile, medium, material.phase, surface.ior);
-            Matter::Bssrdf { surface, bssrdf }
+            Matter::Bssrdf { surface, bssrdf: Box::new(bssrdf) }
         }
     }
 }

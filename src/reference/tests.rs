@@ -79,7 +79,10 @@ fn agree(what: &str, (mean, error): (Rgb, Rgb), expected: Rgb) {
     let z = (mean - expected) / error;
     assert!(z.abs().max_element() < 4.0, "{what}: {mean} +- {error}, expected {expected}, z {z}");
     let biased = (mean - 1.02 * expected) / error;
-    assert!(biased.abs().max_element() > 4.0, "{what}: {mean} +- {error} would hide a bias of 2 %");
+    assert!(
+        biased.abs().max_element() > 4.0,
+        "{what}: {mean} +- {error}, expected {expected}, would hide a bias of 2 %"
+    );
 }
 
 fn total(parts: &volume::Parts) -> Rgb {

@@ -25,7 +25,7 @@ pub enum Matter {
     /// The same, but light is not followed through it.
     Bssrdf {
         surface: Boundary,
-        bssrdf: Bssrdf,
+        bssrdf: Box<Bssrdf>,
     },
     /// An area light: its place in the scene's list.
     Emitter(usize),
