@@ -56,6 +56,7 @@ pub const PAPERS: &[Paper] = &[
     paper("Karis2013", "B. Karis. Real Shading in Unreal Engine 4. SIGGRAPH 2013 course on physically based shading"),
     paper("Keinert2015", "B. Keinert et al. Spherical Fibonacci Mapping. ACM TOG 34(6), 2015"),
     paper("Khronos2024", "Khronos Group. Khronos PBR Neutral Tone Mapper, 2024"),
+    paper("King2013", "A. King, C. Kulla, A. Conty & M. Fajardo. BSSRDF Importance Sampling. SIGGRAPH 2013 talks"),
     paper(
         "Maisch2020",
         "S. Maisch & T. Ropinski. Interactive Subsurface Scattering for Materials With High Scattering Distances. CGF 39(6), 2020",
@@ -64,6 +65,7 @@ pub const PAPERS: &[Paper] = &[
     paper("OpenPBR2024", "Academy Software Foundation. OpenPBR Surface 1.1, 2024"),
     paper("Ottosson2020", "B. Ottosson. A Perceptual Color Space for Image Processing. 2020"),
     paper("Patro2007", "R. Patro. Real-Time Approximate Subsurface Scattering. 2007"),
+    paper("Pharr2016", "M. Pharr, W. Jakob & G. Humphreys. Physically Based Rendering, third edition. 2016"),
     paper(
         "Ramamoorthi2001",
         "R. Ramamoorthi & P. Hanrahan. An Efficient Representation for Irradiance Environment Maps. SIGGRAPH 2001",

@@ -572,3 +572,25 @@ fn two_sessions_make_the_same_bits() {
     };
     assert_eq!(shot().pixels, shot().pixels);
 }
+
+/// A texture may stand for a number by any of its channels, over any range, from either end.
+#[test]
+fn a_texture_is_the_number_that_its_words_make_of_it() {
+    let mut studio = ready();
+    studio.write_exr("map.exr", &Image::filled(4, 4, [0.9, 0.25, 0.1]));
+    let mut with = |roughness: &str| {
+        studio.write(
+            "rough.ron",
+            format!("Material(version: 1, surface: (ior: 1.5, roughness: {roughness}), medium: Opaque(albedo: 0.3))"),
+        );
+        studio.picture(&format!(
+            "mm_per_unit: 10, camera: (eye: (0, 0, 4), target: (0, 0, 0), fov_y_deg: 40),
+             lights: [Directional(direction: (-1, -1, -2), irradiance: 3)],
+             objects: [(mesh: Sphere(radius: 1, subdivisions: 4), material: \"rough.ron\")], {VIEW}"
+        ))
+    };
+    let mapped = with("Texture(image: \"map.exr\", channel: G, range: (0.2, 0.6), invert: true)");
+    let (same, other) = (with("0.5"), with("0.3"));
+    assert!(most_apart(&mapped, &same) < 0.01, "{}", most_apart(&mapped, &same));
+    assert!(most_apart(&mapped, &other) > 0.1, "{}", most_apart(&mapped, &other));
+}

@@ -55,7 +55,7 @@ struct Trace {
     output: Option<PathBuf>,
     #[command(flatten)]
     look: LookFlags,
-    /// volume (random walks through the media)
+    /// volume (random walks through the media), or bssrdf (each material's profile, with nothing else approximated)
     #[arg(long, value_enum, default_value = "volume")]
     integrator: Integrator,
     /// full, or direct: light source, object, eye
@@ -128,9 +128,14 @@ impl Trace {
         {
             return Err(words("--variance: a variance is no colour", "write it to a file that ends in .exr").into());
         }
-        if !matches!(self.integrator, Integrator::Volume) {
-            return Err(words("--integrator: only `volume` is in this version", "leave the flag away").into());
-        }
+        let (integrator, name) = match self.integrator {
+            Integrator::Volume => (reference::Integrator::Volume, "volume"),
+            Integrator::Bssrdf => (reference::Integrator::Bssrdf, "bssrdf"),
+            Integrator::Layered => {
+                let hint = "volume, or bssrdf: both see the innermost medium only";
+                return Err(words("--integrator: `layered` is not in this version", hint).into());
+            }
+        };
         let positive = |flag: &str, value: Option<f64>| match value {
             Some(value) if !(value.is_finite() && value > 0.0) => {
                 Err(words(format!("{flag} {value}: this can never be reached"), "a number above 0"))
@@ -150,6 +155,7 @@ impl Trace {
         let own = &scene.reference;
         let (first, step) = self.tile.map_or((0, 1), |(i, n)| (i - 1, n));
         let settings = reference::Settings {
+            integrator,
             light: match self.light {
                 LightFlag::Full => Light::Full,
                 LightFlag::Direct => Light::Direct,
@@ -173,7 +179,7 @@ impl Trace {
         whole(&picture)?;
         let scene_key = Key::of(&scene).to_string();
         let made_by = format!(
-            "volume, {:?} light, {part:?} part, {} samples, seed {}",
+            "{name}, {:?} light, {part:?} part, {} samples, seed {}",
             settings.light, film.samples, settings.seed
         );
         let mut text = vec![

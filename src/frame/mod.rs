@@ -27,7 +27,7 @@ use crate::geometry::mesh::Mesh;
 use crate::gpu::{Bind, Blend, Buffer, Depth, Draw, Format, Images, Layer, Raster, Shaders};
 use crate::optics::fresnel::diffuse_transmittance;
 use crate::problem::{Problem, counted};
-use crate::scene::{Camera, LightKind, Material, Object, Scene, Substance, TextureMap, Varying, shape};
+use crate::scene::{Camera, LightKind, Material, Object, Scene, Substance, Varying, shape};
 use crate::store::{Plan, Slot};
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec3};
 use std::cell::OnceCell;
@@ -248,7 +248,7 @@ impl<'a> Frame<'a> {
         self.objects.get_or_init(table).clone()
     }
 
-    fn row(&self, item: &Item, maps: &[&TextureMap]) -> tables::Object {
+    fn row(&self, item: &Item, maps: &[surface::Use]) -> tables::Object {
         let eye_from_world = DAffine3::from_translation(-self.view.camera.eye);
         let mut row = tables::Object {
             eye_from_object: DMat4::from(eye_from_world * item.world_from_object).as_mat4(),
@@ -276,11 +276,13 @@ impl<'a> Frame<'a> {
                 row.scatter = scatter(material).as_vec3();
                 match &material.surface.color {
                     Varying::Constant(color) => row.color = color.as_vec3(),
-                    Varying::Texture(map) => row.color_layer = surface::layer_of(maps, map),
+                    Varying::Texture(map) => row.color_layer = surface::layer_of(maps, (map, None)),
                 }
                 match &material.surface.roughness {
                     Varying::Constant(roughness) => row.roughness = *roughness as f32,
-                    Varying::Texture(map) => row.roughness_layer = surface::layer_of(maps, map),
+                    Varying::Texture(map) => {
+                        row.roughness_layer = surface::layer_of(maps, (map, Some(map.as_number())))
+                    }
                 }
                 if let Substance::Translucent(medium) = &material.medium {
                     row.flags = tables::TRANSLUCENT;

@@ -5,7 +5,7 @@ use crate::geometry::mesh::Mesh;
 use crate::gpu::{Bind, Buffer, Draw, Format, Gpu, Images, Shader, Shape};
 use crate::image::Texture;
 use crate::problem::{Problem, counted};
-use crate::scene::{Material, TextureMap, Varying};
+use crate::scene::{AsNumber, Material, TextureMap, Varying};
 use crate::store::{Key, Plan, Run, Slot, Step};
 use glam::Vec3;
 use half::f16;
@@ -127,13 +127,19 @@ impl<'a> Surface<'a> {
     }
 }
 
+/// An image as materials use it: as a colour, or as one number.
+pub(super) type Use<'a> = (&'a TextureMap, Option<AsNumber>);
+
 /// The textures of all materials in the picture, in the order in which objects name them.
-pub(super) fn maps<'a>(frame: &'a Frame) -> Vec<&'a TextureMap> {
-    let mut found: Vec<&TextureMap> = Vec::new();
+pub(super) fn maps<'a>(frame: &'a Frame) -> Vec<Use<'a>> {
+    let mut found: Vec<Use> = Vec::new();
     for material in frame.items.iter().filter(|item| item.in_view).filter_map(|item| frame.material(item)) {
         let surface = &material.surface;
-        let color = if let Varying::Texture(map) = &surface.color { Some(map.as_ref()) } else { None };
-        let roughness = if let Varying::Texture(map) = &surface.roughness { Some(map.as_ref()) } else { None };
+        let color = if let Varying::Texture(map) = &surface.color { Some((map.as_ref(), None)) } else { None };
+        let roughness = match &surface.roughness {
+            Varying::Texture(map) => Some((map.as_ref(), Some(map.as_number()))),
+            Varying::Constant(_) => None,
+        };
         for map in [color, roughness].into_iter().flatten() {
             if !found.contains(&map) {
                 found.push(map);
@@ -144,23 +150,27 @@ pub(super) fn maps<'a>(frame: &'a Frame) -> Vec<&'a TextureMap> {
 }
 
 /// A map's layer in the array of textures; -1 for one that no object in view names.
-pub(super) fn layer_of(maps: &[&TextureMap], map: &TextureMap) -> i32 {
-    maps.iter().position(|other| *other == map).map_or(-1, |layer| layer as i32)
+pub(super) fn layer_of(maps: &[Use], wanted: Use) -> i32 {
+    maps.iter().position(|other| *other == wanted).map_or(-1, |layer| layer as i32)
 }
 
 /// The array of textures; none when no material in view has any.
 pub(super) fn textures(frame: &Frame, plan: &mut Plan) -> Option<Slot<Images>> {
-    let maps: Vec<Slot<Texture>> = maps(frame)
+    let maps: Vec<(Slot<Texture>, Option<AsNumber>)> = maps(frame)
         .into_iter()
-        .map(|map| plan.given("image.file", map.path.display().to_string(), Key::of(map), map.texture.clone()))
+        .map(|(map, number)| {
+            let about = map.path.display().to_string();
+            (plan.given("image.file", about, Key::of(map), map.texture.clone()), number)
+        })
         .collect();
     (!maps.is_empty()).then(|| plan.add(Textures { maps }))
 }
 
-/// All textures in one array: each is stretched to the size of the largest.
+/// All textures in one array: each is stretched to the size of the largest; what stands for a number has it in its first
+/// channel.
 #[derive(Serialize)]
 struct Textures {
-    maps: Vec<Slot<Texture>>,
+    maps: Vec<(Slot<Texture>, Option<AsNumber>)>,
 }
 
 /// Larger textures are shrunk to this.
@@ -175,17 +185,18 @@ impl Step for Textures {
         format!("{} to the device", counted(self.maps.len(), "texture"))
     }
     fn run(&self, run: &Run) -> Result<Images, Problem> {
-        let maps: Vec<_> = self.maps.iter().map(|slot| run.get(*slot)).collect();
-        let size = |side: fn(&Texture) -> u32| maps.iter().map(|map| side(map)).max().unwrap_or(1).min(LARGEST);
+        let maps: Vec<_> = self.maps.iter().map(|(slot, number)| (run.get(*slot), number)).collect();
+        let size = |side: fn(&Texture) -> u32| maps.iter().map(|(map, _)| side(map)).max().unwrap_or(1).min(LARGEST);
         let (width, height) = (size(|map| map.width), size(|map| map.height));
-        let halves: Vec<[f16; 4]> = maps.iter().flat_map(|map| stretched(map, width, height)).collect();
+        let halves: Vec<[f16; 4]> =
+            maps.iter().flat_map(|(map, number)| stretched(map, **number, width, height)).collect();
         let shape = Shape::array((width, height), maps.len() as u32, Format::Rgba16Float);
         Ok(Images(vec![run.host::<Gpu>().texture_with(shape, bytemuck::cast_slice(&halves))]))
     }
 }
 
 /// Bilinear, repeating.
-fn stretched(map: &Texture, width: u32, height: u32) -> Vec<[f16; 4]> {
+fn stretched(map: &Texture, number: Option<AsNumber>, width: u32, height: u32) -> Vec<[f16; 4]> {
     let place = |i: u32, to: u32, from: u32| {
         let at = (i as f32 + 0.5) * from as f32 / to as f32 - 0.5;
         let low = at.floor();
@@ -198,10 +209,14 @@ fn stretched(map: &Texture, width: u32, height: u32) -> Vec<[f16; 4]> {
         for x in 0..width {
             let (x0, x1, fx) = place(x, width, map.width);
             let texel = |x: u32, y: u32, c: usize| map.texels[(y * map.width + x) as usize][c];
-            texels.push(std::array::from_fn(|c| {
+            let mut values: [f32; 4] = std::array::from_fn(|c| {
                 let row = |y| texel(x0, y, c) * (1.0 - fx) + texel(x1, y, c) * fx;
-                f16::from_f32(row(y0) * (1.0 - fy) + row(y1) * fy)
-            }));
+                row(y0) * (1.0 - fy) + row(y1) * fy
+            });
+            if let Some(number) = number {
+                values[0] = number.of(values.map(f64::from)) as f32;
+            }
+            texels.push(values.map(f16::from_f32));
         }
     }
     texels

@@ -123,6 +123,28 @@ impl Bvh {
         self.closest(self.local(origin, direction, 0.0, t_max), |source| start == Some(source))
     }
 
+    /// Every hit of one object by the whole line through `p` (scene units) along the unit vector `direction`, in the line's
+    /// order; `t` is below 0 behind `p`.
+    pub fn hits_along(&self, object: u32, p: DVec3, direction: DVec3) -> Vec<Hit> {
+        let p = (p - self.center) / self.scale;
+        // From end to end of the scene's sphere.
+        let moved = -p.dot(direction) - 1.0;
+        let local = Local { origin: p + moved * direction, direction, t_min: 0.0, t_max: 2.0, moved };
+        let mut hits = Vec::new();
+        self.tree.ray_traverse(local.ray(), &mut RayHit::none(), |_, i| {
+            let (of, triangle) = self.source[i];
+            if of == object
+                && let Some((t, barycentrics)) = local.intersect(&self.corners[i])
+            {
+                hits.push(Hit { t: (t + moved) * self.scale, object, triangle, barycentrics });
+            }
+            // The line goes on.
+            f32::INFINITY
+        });
+        hits.sort_by(|a, b| a.t.total_cmp(&b.t));
+        hits
+    }
+
     fn closest(&self, mut local: Local, is_left_out: impl Fn((u32, u32)) -> bool) -> Option<Hit> {
         let mut best = None;
         let mut found = RayHit::none();
@@ -242,6 +264,33 @@ mod tests {
                 }
             }
             assert!(hits > 200 && hits < 2000, "{hits}");
+        }
+    }
+
+    #[test]
+    fn a_line_meets_what_rays_along_it_meet() {
+        for scale in [1.0, 1e-25, 1e25] {
+            let (_, bvh) = scene(DAffine3::from_scale(DVec3::splat(scale)));
+            let mut most = 0;
+            for (i, d) in directions(512).into_iter().enumerate() {
+                let p = 0.9 * scale * directions(512)[(i * 37) % 512];
+                let mut expected = vec![Vec::new(); 3];
+                let (mut origin, mut start) = (p - 4.0 * scale * d, None);
+                while let Some(hit) = bvh.closest_hit_but(origin, d, f64::INFINITY, start) {
+                    origin += hit.t * d;
+                    start = Some((hit.object, hit.triangle));
+                    expected[hit.object as usize].push((hit.triangle, (origin - p).dot(d)));
+                }
+                for (object, expected) in expected.iter().enumerate() {
+                    let hits = bvh.hits_along(object as u32, p, d);
+                    assert_eq!(hits.len(), expected.len());
+                    most = most.max(hits.len());
+                    for (hit, (triangle, t)) in hits.iter().zip(expected) {
+                        assert!(hit.triangle == *triangle && (hit.t - t).abs() < 1e-9 * scale, "{hit:?} {t}");
+                    }
+                }
+            }
+            assert!(most >= 6, "{most}");
         }
     }
 

@@ -3,7 +3,9 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | [`volume`] | the integrator: unbiased random walks through the media |
+//! | [`volume`] | the first integrator: unbiased random walks through the media |
+//! | [`bssrdf`] | the second: the diffusion profile of each material, where light enters and where it leaves |
+//! | [`surfaces`] | what surfaces do that paths do not enter |
 //! | [`boundary`] | reflection and refraction, smooth and rough |
 //! | [`refracted`] | lamps without extent, seen from inside through a smooth boundary |
 //! | [`light`] | lamps and the surroundings |
@@ -16,33 +18,47 @@
 //! Re-runs when: anything in the scene that light could meet changes, the camera, the size, or this room's code.
 
 pub mod boundary;
+pub mod bssrdf;
 pub mod film;
 pub mod light;
 pub mod random;
 pub mod refracted;
+mod surfaces;
 pub mod volume;
 pub mod world;
 
 use crate::geometry::mesh::Mesh;
 use crate::image::{Image, Texture};
-use crate::optics::Rgb;
+use crate::optics::{Rgb, medium};
 use crate::problem::Problem;
 use crate::scene::{Camera, LightKind, Object, Part, Scene, Sky, Substance, shape};
 use crate::store::{Bake, Key, Plan, Run, Slot, Step};
+use bssrdf::Bssrdf;
 use film::{Film, Moments};
 use glam::{DAffine3, DMat3, DVec3};
 use light::{Kind, Lamp, SkyImage};
 use random::Random;
 use rayon::prelude::*;
 use refracted::Refracted;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use volume::{Inside, Light, Tracer};
 use world::{Boundary, Matter, Medium, Thing, World};
 
+/// What light does below a surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+pub enum Integrator {
+    #[default]
+    /// It is followed: the truth.
+    Volume,
+    /// The material's profile says how far it goes: what that model makes when nothing else is approximated.
+    Bssrdf,
+}
+
 /// Which picture, and how far to go.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
+    pub integrator: Integrator,
     pub light: Light,
     pub camera: Camera,
     pub size: (u32, u32),
@@ -93,7 +109,7 @@ fn tracer(plan: &mut Plan, scene: &Scene, settings: &Settings) -> Slot<Tracer> {
         things.push(Placed {
             mesh: shape::mesh(plan, object, settings.time_s),
             world_from_object: DAffine3::from_rotation_translation(rotation, translation),
-            matter: matter(object, scene.mm_per_unit),
+            matter: matter(object, scene.mm_per_unit, settings.integrator),
         });
     }
     for light in scene.lights.iter().filter(|light| light.enabled) {
@@ -128,24 +144,29 @@ fn tracer(plan: &mut Plan, scene: &Scene, settings: &Settings) -> Slot<Tracer> {
 }
 
 /// What an object is made of, with coefficients per scene unit.
-fn matter(object: &Object, mm_per_unit: f64) -> Matter {
+fn matter(object: &Object, mm_per_unit: f64, integrator: Integrator) -> Matter {
     let material = &object.material;
     let surface = Boundary {
         ior: material.surface.ior,
         roughness: material.surface.roughness.clone(),
         color: material.surface.color.clone(),
     };
-    match &material.medium {
-        Substance::Opaque { albedo } => Matter::Opaque { surface, albedo: *albedo },
-        Substance::Translucent(medium) => Matter::Translucent {
-            surface,
-            medium: Medium {
-                sigma_a: medium.sigma_a * mm_per_unit,
-                sigma_s: medium.sigma_s * mm_per_unit,
-                phase: material.phase,
-                parameter: Rgb::from_array(medium.g.to_array().map(|g| material.phase.parameter(g))),
-            },
-        },
+    let medium = match &material.medium {
+        Substance::Opaque { albedo } => return Matter::Opaque { surface, albedo: *albedo },
+        Substance::Translucent(medium) => medium,
+    };
+    let (sigma_a, sigma_s) = (medium.sigma_a * mm_per_unit, medium.sigma_s * mm_per_unit);
+    match integrator {
+        Integrator::Volume => {
+            let parameter = Rgb::from_array(medium.g.to_array().map(|g| material.phase.parameter(g)));
+            let medium = Medium { sigma_a, sigma_s, phase: material.phase, parameter };
+            Matter::Translucent { surface, medium }
+        }
+        Integrator::Bssrdf => {
+            let medium = medium::Medium { sigma_a, sigma_s, g: medium.g };
+            let bssrdf = Bssrdf::new(material.profile, medium, material.phase, surface.ior);
+            Matter::Bssrdf { surface, bssrdf: Box::new(bssrdf) }
+        }
     }
 }
 

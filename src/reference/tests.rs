@@ -79,7 +79,10 @@ fn agree(what: &str, (mean, error): (Rgb, Rgb), expected: Rgb) {
     let z = (mean - expected) / error;
     assert!(z.abs().max_element() < 4.0, "{what}: {mean} +- {error}, expected {expected}, z {z}");
     let biased = (mean - 1.02 * expected) / error;
-    assert!(biased.abs().max_element() > 4.0, "{what}: {mean} +- {error} would hide a bias of 2 %");
+    assert!(
+        biased.abs().max_element() > 4.0,
+        "{what}: {mean} +- {error}, expected {expected}, would hide a bias of 2 %"
+    );
 }
 
 fn total(parts: &volume::Parts) -> Rgb {
@@ -230,3 +233,30 @@ fn ways_of_finding_light_share_it_out() {
         assert!((b_error / b).max_element() < 0.03, "ior {ior}: {b} +- {b_error} proves too little");
     }
 }
+
+/// A floor and a wall: what one sends out, the other takes in.
+fn corner(matter: &Matter) -> Vec<(Mesh, Matter)> {
+    let floor = shapes::slab(DVec3::new(4.0, 1.0, 4.0), (1, 1));
+    let mut wall = shapes::slab(DVec3::new(1.0, 2.0, 4.0), (1, 1));
+    wall.positions.iter_mut().for_each(|p| *p += glam::Vec3::new(-1.0, 1.5, 0.0));
+    vec![(floor, matter.clone()), (wall, matter.clone())]
+}
+
+/// Into the corner.
+fn at_corner(random: &mut Random) -> (DVec3, DVec3) {
+    let (a, b) = random.pair();
+    let target = DVec3::new(0.5 * a - 0.5, 0.5, b - 0.5);
+    let eye = DVec3::new(3.0, 4.0, 0.5);
+    (eye, (target - eye).normalize())
+}
+
+#[test]
+fn nothing_is_lost_between_white_surfaces() {
+    for (ior, roughness) in [(1.0, 0.0), (1.5, 0.0), (3.0, 0.1)] {
+        let white = Matter::Opaque { surface: surface(ior, roughness), albedo: Rgb::ONE };
+        let tracer = tracer(corner(&white), Vec::new(), Some(1.0), Light::Full, 1000);
+        agree(&format!("ior {ior}"), measure(&tracer, 20_000, at_corner, total), Rgb::ONE);
+    }
+}
+
+mod bssrdf;

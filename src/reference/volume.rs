@@ -12,18 +12,20 @@ use super::boundary::Facing;
 use super::light::{Lamp, Ray, Sky};
 use super::random::Random;
 use super::refracted::Refracted;
+use super::surfaces::Bounce;
 use super::world::{Boundary, Matter, Medium, Place, Point, Thing, World};
 use crate::optics::Rgb;
-use crate::optics::fresnel::{diffuse_transmittance, fresnel_dielectric};
+use crate::optics::fresnel::fresnel_dielectric;
 use glam::DVec3;
 use std::f64::consts::PI;
 
 /// Which light counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Light {
     /// Light source, object, eye: what real-time methods make.
     Direct,
     /// Also what leaves one place and enters another.
+    #[default]
     Full,
 }
 
@@ -169,16 +171,16 @@ impl Tracer {
             Matter::Emitter(_) => {
                 parts.unscattered = self.emitted(point, direction).map_or(Rgb::ZERO, |(light, _)| light)
             }
-            Matter::Opaque { surface, albedo } => {
-                parts.glossy = self.gloss(thing, surface, point, direction, random);
-                parts.scattered = self.diffuse(thing, surface, *albedo, point, direction, 0, random);
-            }
-            Matter::Translucent { .. } if direction.dot(point.flat) > 0.0 => {
+            Matter::Translucent { .. } | Matter::Bssrdf { .. } if direction.dot(point.flat) > 0.0 => {
                 // The back of a mesh that is not closed: nothing is entered.
                 parts.unscattered = self.radiance(point.p, direction, point.place, None, 1, random);
             }
+            Matter::Opaque { surface, .. } | Matter::Bssrdf { surface, .. } => {
+                parts.glossy = self.follow(self.gloss(thing, surface, point, direction, random), random);
+                parts.scattered = self.follow(self.scattered(thing, point, direction, random), random);
+            }
             Matter::Translucent { surface, .. } => {
-                parts.glossy = self.gloss(thing, surface, point, direction, random);
+                parts.glossy = self.follow(self.gloss(thing, surface, point, direction, random), random);
                 let facing = self.facing(thing, surface, point, direction, Inside::default());
                 let (into, share) = match facing.is_smooth() {
                     true => {
@@ -218,6 +220,17 @@ impl Tracer {
             depth: 0,
             sum: Sum::default(),
         }
+    }
+
+    /// What a surface sends back along the eye's ray by one of its ways.
+    fn follow(&self, bounce: Option<Bounce>, random: &mut Random) -> Rgb {
+        bounce.map_or(Rgb::ZERO, |bounce| {
+            let Bounce { joined, p, place, direction, weight, density } = bounce;
+            match weight == Rgb::ZERO {
+                true => joined,
+                false => joined + weight * self.radiance(p, direction, place, density, 1, random),
+            }
+        })
     }
 
     /// All light along a ray through nothing, from a surface on: of everything for full light, of lamps and sky for direct.
@@ -294,109 +307,9 @@ impl Tracer {
         }
     }
 
-    /// Light reflected at the outside of a boundary.
-    fn gloss(&self, thing: &Thing, surface: &Boundary, point: &Point, d: DVec3, random: &mut Random) -> Rgb {
-        if surface.ior == 1.0 || d.dot(point.flat) >= 0.0 {
-            return Rgb::ZERO;
-        }
-        let facing = Facing {
-            flat: point.flat,
-            normal: point.normal,
-            eta: surface.ior,
-            roughness: thing.roughness(surface, point),
-        };
-        if facing.is_smooth() {
-            let split = facing.split(d);
-            return split.reflectance * self.radiance(point.p, split.reflected, point.place, None, 1, random);
-        }
-        let mut sum = self.joined(point, random, |to| {
-            let (value, density) = facing.value(d, to);
-            if to.dot(point.flat) > 0.0 { (value, density) } else { (0.0, 0.0) }
-        });
-        let h = facing.microfacet(d, random.pair());
-        let split = facing.split_at(d, h);
-        let unhidden = facing.unhidden(d, split.reflected, true);
-        if unhidden > 0.0 {
-            let density = facing.value(d, split.reflected).1;
-            let light = self.radiance(point.p, split.reflected, point.place, Some(density), 1, random);
-            sum += split.reflectance * unhidden * light;
-        }
-        sum
-    }
-
-    /// Light scattered by an opaque surface: Lambertian under its boundary, all of the albedo leaving.
-    #[expect(clippy::too_many_arguments, reason = "a surface, a point of it, and a path")]
-    fn diffuse(
-        &self,
-        thing: &Thing,
-        surface: &Boundary,
-        albedo: Rgb,
-        point: &Point,
-        d: DVec3,
-        depth: u32,
-        random: &mut Random,
-    ) -> Rgb {
-        // A sheet is seen from behind too: its normal turns to the eye.
-        let side = if d.dot(point.flat) < 0.0 { 1.0 } else { -1.0 };
-        let (flat, normal) = (side * point.flat, side * point.normal);
-        let enters = |cos: f64| 1.0 - fresnel_dielectric(cos.clamp(0.0, 1.0), surface.ior);
-        let leaving = enters(-d.dot(normal)) / (PI * diffuse_transmittance(surface.ior));
-        let scale = thing.color(surface, point) * albedo * leaving;
-        let mut sum = self.joined(point, random, |to| {
-            let cos = to.dot(normal);
-            if cos > 0.0 && to.dot(flat) > 0.0 { (enters(cos) * cos, cos / PI) } else { (0.0, 0.0) }
-        });
-        let (u, v) = random.pair();
-        let (x, y) = normal.any_orthonormal_pair();
-        let (sin, cos) = (2.0 * PI * v).sin_cos();
-        let to = u.sqrt() * (cos * x + sin * y) + (1.0 - u).sqrt() * normal;
-        if to.dot(flat) > 0.0 {
-            let cos = to.dot(normal);
-            sum += PI * enters(cos) * self.radiance(point.p, to, point.place, Some(cos / PI), depth + 1, random);
-        }
-        scale * sum
-    }
-
-    /// Light of all lamps and of the sky's image at a point outside, each from one direction: `value` gives a surface's
-    /// value times cosine for a direction, and the density with which the surface itself would have chosen it.
-    fn joined(&self, point: &Point, random: &mut Random, value: impl Fn(DVec3) -> (f64, f64)) -> Rgb {
-        let mut sum = Rgb::ZERO;
-        let mut add = |ray: Ray, shadow: bool| {
-            let (value, density) = value(ray.direction);
-            if value > 0.0 && (!shadow || self.reaches(point.p, &ray, Some(point.place))) {
-                let share = ray.density.map_or(1.0, |own| own / (own + density));
-                sum += share * value * ray.irradiance;
-            }
-        };
-        for lamp in self.lamps.iter().filter(|lamp| self.is_joined(lamp)) {
-            if let Some(ray) = lamp.sample(point.p, random) {
-                add(ray, lamp.shadow);
-            }
-        }
-        if let Some((ray, shadow)) = self.sky_sample(random) {
-            add(ray, shadow);
-        }
-        sum
-    }
-
-    fn is_joined(&self, lamp: &Lamp) -> bool {
-        self.joins || !lamp.has_extent()
-    }
-
-    fn sky_sample(&self, random: &mut Random) -> Option<(Ray, bool)> {
-        let sky = self.sky.as_ref().filter(|_| self.joins)?;
-        Some((sky.sample(random)?, sky.shadow))
-    }
-
-    /// Whether nothing is between a point and a lamp.
-    fn reaches(&self, p: DVec3, ray: &Ray, on: Option<Place>) -> bool {
-        // The lamp itself stands at the end.
-        self.world.is_free(p, ray.direction, ray.distance * (1.0 - 1e-9), on)
-    }
-
     /// Follows a path to its end. `met` is what its ray meets first, if that is known already.
     fn walk_from(&self, mut walk: Walk, mut met: Option<Point>, random: &mut Random) -> Sum {
-        while walk.depth < self.max_depth {
+        loop {
             let medium = self.medium(walk.inside);
             let sigma_t = medium.map_or(Rgb::ZERO, Medium::sigma_t);
             let free = match sigma_t[walk.weight.hero] {
@@ -404,10 +317,13 @@ impl Tracer {
                 sigma => random.exponential() / sigma,
             };
             let point = met.take().or_else(|| self.world.meet(walk.origin, walk.direction, free, walk.on));
-            walk.depth += 1;
             if medium.is_none() && !std::mem::replace(&mut walk.counted, false) {
                 walk.add(self.shining(walk.origin, walk.direction, point.as_ref(), walk.density));
             }
+            if walk.depth >= self.max_depth {
+                return walk.sum;
+            }
+            walk.depth += 1;
             match (point, medium) {
                 (Some(point), _) => {
                     let through = (-sigma_t * point.t).exp();
@@ -435,7 +351,6 @@ impl Tracer {
                 walk.weight.value *= 0.1 / left;
             }
         }
-        walk.sum
     }
 
     /// A path meets a medium's particle: light that is scattered there, and the way on.
@@ -522,13 +437,11 @@ impl Tracer {
                 }
                 return false;
             }
+            Matter::Bssrdf { surface, .. } => return self.turn(walk, thing, surface, &point, random),
+            Matter::Opaque { surface, .. } if walk.inside.count == 0 => {
+                return self.turn(walk, thing, surface, &point, random);
+            }
             Matter::Opaque { surface, albedo } => {
-                if walk.inside.count == 0 {
-                    let light = self.diffuse(thing, surface, *albedo, &point, d, walk.depth, random)
-                        + self.gloss(thing, surface, &point, d, random);
-                    walk.add(light);
-                    return false;
-                }
                 // An opaque thing within a medium: white paint whose boundary the medium wets.
                 walk.scattered = true;
                 let normal = if d.dot(point.normal) < 0.0 { point.normal } else { -point.normal };
@@ -600,6 +513,24 @@ impl Tracer {
             walk.direction = split.reflected;
         }
         walk.density = None;
+        walk.weight.value.max_element() > 0.0
+    }
+
+    /// A path in the open meets a surface that it does not enter: it is reflected or scattered; whether it goes on.
+    fn turn(&self, walk: &mut Walk, thing: &Thing, surface: &Boundary, point: &Point, random: &mut Random) -> bool {
+        let d = walk.direction;
+        // By chance, with the share of a smooth boundary: were both followed, paths in a corner would never end.
+        let shine = fresnel_dielectric(d.dot(point.normal).abs().min(1.0), surface.ior);
+        let (bounce, chance) = match random.unit() < shine {
+            true => (self.gloss(thing, surface, point, d, random), shine),
+            false => (self.scattered(thing, point, d, random), 1.0 - shine),
+        };
+        let Some(bounce) = bounce else { return false };
+        walk.weight.value /= chance;
+        walk.add(bounce.joined);
+        walk.weight.value *= bounce.weight;
+        (walk.origin, walk.on) = (bounce.p, Some(bounce.place));
+        (walk.direction, walk.density) = (bounce.direction, bounce.density);
         walk.weight.value.max_element() > 0.0
     }
 

@@ -1,10 +1,11 @@
 //! The scene as rays see it: every triangle of every visible object and area light in world space.
 
+use super::bssrdf::Bssrdf;
 use crate::geometry::bvh::{Bvh, Hit};
 use crate::geometry::mesh::Mesh;
 use crate::optics::Rgb;
 use crate::optics::phase::Phase;
-use crate::scene::{Channel, TextureMap, Varying};
+use crate::scene::{TextureMap, Varying};
 use glam::{DAffine3, DMat3, DVec3};
 use serde::Serialize;
 use std::sync::Arc;
@@ -20,6 +21,11 @@ pub enum Matter {
     Translucent {
         surface: Boundary,
         medium: Medium,
+    },
+    /// The same, but light is not followed through it.
+    Bssrdf {
+        surface: Boundary,
+        bssrdf: Box<Bssrdf>,
     },
     /// An area light: its place in the scene's list.
     Emitter(usize),
@@ -58,6 +64,14 @@ pub struct Thing {
 pub struct World {
     pub bvh: Bvh,
     pub things: Vec<Thing>,
+    /// Around each thing.
+    pub balls: Vec<Ball>,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Ball {
+    pub center: DVec3,
+    pub radius: f64,
 }
 
 /// A triangle of a thing: a ray that starts on it does not meet it again.
@@ -87,7 +101,7 @@ impl World {
     pub fn new(things: Vec<Thing>) -> World {
         let meshes: Vec<(&Mesh, DAffine3)> =
             things.iter().map(|thing| (thing.mesh.as_ref(), thing.world_from_object)).collect();
-        World { bvh: Bvh::new(&meshes), things }
+        World { bvh: Bvh::new(&meshes), balls: things.iter().map(Thing::ball).collect(), things }
     }
 
     /// What a ray meets first within `t_max`, on either side; never the triangle `from` that it starts on.
@@ -109,12 +123,28 @@ impl World {
         }
     }
 
+    /// Every place where the line through `p` meets one thing, in the line's order; `t` is below 0 behind `p`.
+    pub fn along(&self, thing: usize, p: DVec3, direction: DVec3) -> Vec<Point> {
+        let hits = self.bvh.hits_along(thing as u32, p, direction);
+        hits.into_iter().map(|hit| self.point(p, direction, hit)).collect()
+    }
+
     pub fn is_free(&self, origin: DVec3, direction: DVec3, t_max: f64, from: Option<Place>) -> bool {
         self.bvh.closest_hit_but(origin, direction, t_max, from).is_none()
     }
 }
 
 impl Thing {
+    /// Around the middle of its box. Wide enough for the f32 in which rays see its corners.
+    fn ball(&self) -> Ball {
+        let corners = || self.mesh.positions.iter().map(|p| self.world_from_object.transform_point3(p.as_dvec3()));
+        let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let (min, max) = corners().fold(nothing, |(min, max), p| (min.min(p), max.max(p)));
+        let center = 0.5 * (min + max);
+        let radius = corners().map(|p| p.distance(center)).fold(0.0, f64::max);
+        Ball { center, radius: 1.0001 * radius }
+    }
+
     /// The triangle's outward normal, and the interpolated one on the same side of it; the first for both where the second
     /// vanishes.
     pub fn normals(&self, triangle: usize, b: glam::DVec2) -> (DVec3, DVec3) {
@@ -152,17 +182,7 @@ impl Thing {
     pub fn roughness(&self, surface: &Boundary, point: &Point) -> f64 {
         match &surface.roughness {
             Varying::Constant(roughness) => *roughness,
-            Varying::Texture(map) => {
-                let texel = texel(map, self.uv(point));
-                let value = texel[match map.channel {
-                    Channel::R => 0,
-                    Channel::G => 1,
-                    Channel::B => 2,
-                    Channel::A => 3,
-                }];
-                let value = if map.invert { 1.0 - value } else { value };
-                map.range.0 + (map.range.1 - map.range.0) * value
-            }
+            Varying::Texture(map) => map.as_number().of(texel(map, self.uv(point))),
         }
     }
 }

@@ -103,6 +103,33 @@ pub struct TextureMap {
     pub texture: Arc<Texture>,
 }
 
+/// How a texel's four values are one number.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct AsNumber {
+    channel: Channel,
+    range: (f64, f64),
+    invert: bool,
+}
+
+impl AsNumber {
+    pub fn of(&self, texel: [f64; 4]) -> f64 {
+        let value = texel[match self.channel {
+            Channel::R => 0,
+            Channel::G => 1,
+            Channel::B => 2,
+            Channel::A => 3,
+        }];
+        let share = if self.invert { 1.0 - value } else { value };
+        self.range.0 + (self.range.1 - self.range.0) * share
+    }
+}
+
+impl TextureMap {
+    pub fn as_number(&self) -> AsNumber {
+        AsNumber { channel: self.channel, range: self.range, invert: self.invert }
+    }
+}
+
 impl PartialEq for TextureMap {
     fn eq(&self, other: &TextureMap) -> bool {
         let rest = |t: &TextureMap| (t.key, t.encoding, t.channel, t.range, t.invert);

@@ -30,7 +30,7 @@ mod tests;
 
 pub use document::Kind;
 pub use fields::Triple;
-pub use material::{Layer, Material, Surface, TextureMap, Varying};
+pub use material::{AsNumber, Layer, Material, Surface, TextureMap, Varying};
 pub use material_file::{
     BoxKernel, Curve, Diffusion, Exponential, Filter, FromMedium, Gaussian, Length, Neighbours, Normalized, Weights,
 };

@@ -2,7 +2,8 @@
 //!
 //! Random walks through the media, refracted and reflected at their boundaries, each free path and each direction drawn as
 //! physics has it: unbiased, in f64. `light: Direct` counts what real-time techniques make: light source, object, eye.
-//! `light: Full` also counts what leaves one place and enters another.
+//! `light: Full` also counts what leaves one place and enters another. `integrator: Bssrdf` takes the material's `profile` for
+//! what the medium does, and is what that model makes when nothing else is approximated.
 //!
 //! Costs: seconds to hours. Samples double until the relative standard error of the picture is at most `max_error`, or
 //! `max_spp` is reached; each doubling is kept, so that the same picture goes on where it was. It asks for no adapter.
@@ -21,8 +22,8 @@
 //! ```
 
 use crate::problem::Problem;
-use crate::reference::Settings;
 use crate::reference::volume::Light;
+use crate::reference::{Integrator, Settings};
 use crate::scene::{Scene, TechniqueText};
 use serde::Deserialize;
 
@@ -30,24 +31,11 @@ use serde::Deserialize;
 #[serde(default, deny_unknown_fields)]
 pub struct Reference {
     pub integrator: Integrator,
-    pub light: WhichLight,
+    pub light: Light,
     pub max_error: Option<f64>,
     pub max_spp: Option<u32>,
     pub max_depth: Option<u32>,
     pub seed: Option<u64>,
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-pub enum Integrator {
-    #[default]
-    Volume,
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-pub enum WhichLight {
-    #[default]
-    Full,
-    Direct,
 }
 
 impl Reference {
@@ -82,10 +70,8 @@ impl Reference {
     /// How to trace a scene as `look` has it: settings here, else the scene's own.
     pub fn settings(&self, scene: &Scene, view: &crate::frame::View) -> Settings {
         Settings {
-            light: match self.light {
-                WhichLight::Full => Light::Full,
-                WhichLight::Direct => Light::Direct,
-            },
+            integrator: self.integrator,
+            light: self.light,
             camera: view.camera,
             size: view.size,
             time_s: view.time_s,

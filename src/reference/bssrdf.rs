@@ -1,0 +1,108 @@
+//! The separable BSSRDF: light that enters at x_i leaves at x_o by
+//! S = (1 - F(cos_o)) R_d(|x_o - x_i|) (1 - F(cos_i)) / (c pi), whatever lies between the two [Jensen2001, eq. 5], with the
+//! c of [`diffuse_transmittance`](crate::optics::fresnel::diffuse_transmittance) and any [`profile`](crate::optics::profile).
+//! What is told here is x_i; Fresnel's factors are those of [`super::surfaces`]. No light passes unscattered.
+//!
+//! x_i is sought by a line along the normal at x_o or along one of two tangents, at a radius drawn from one channel's
+//! profile [King2013]. Each place where the line meets the thing has a density, that of all axes and channels together
+//! (the balance heuristic). Of these places one is drawn in proportion to R_d over its density, where [Pharr2016, 15.4.2]
+//! draws evenly. More differs from there: neither radii nor lines end, so nothing is cut off; the line meets the same thing,
+//! not the same material, so that things which touch do not bleed into one another; and some lines are laid anywhere
+//! through the thing, since a profile's own radii seldom lead to its far side, from which a lamp behind it shines.
+
+use super::random::Random;
+use super::world::{Ball, Point, World};
+use crate::optics::Rgb;
+use crate::optics::medium::Medium;
+use crate::optics::phase::Phase;
+use crate::optics::profile::{Model, Profile};
+use glam::DVec3;
+use serde::Serialize;
+use std::f64::consts::PI;
+
+/// How far light goes in a material.
+#[derive(Clone, Debug, Serialize)]
+pub struct Bssrdf {
+    model: Model,
+    medium: Medium,
+    phase: Phase,
+    ior: f64,
+    /// Made from the above, and lengths are scene units.
+    #[serde(skip)]
+    profiles: [Profile; 3],
+}
+
+/// A place where light enters.
+pub struct Entry {
+    pub point: Point,
+    /// R_d over the density with which the place was drawn, both per squared scene unit.
+    pub weight: Rgb,
+}
+
+/// The chance of each axis: the normal and two tangents.
+const CHANCES: [f64; 3] = [0.5, 0.25, 0.25];
+/// The share of lines that are laid anywhere through the thing.
+const ANYWHERE: f64 = 0.125;
+
+impl Bssrdf {
+    /// With coefficients per scene unit, under a boundary of relative index `ior`, 1 or more.
+    pub fn new(model: Model, medium: Medium, phase: Phase, ior: f64) -> Bssrdf {
+        Bssrdf { model, medium, phase, ior, profiles: Profile::of_medium(model, &medium, phase, ior) }
+    }
+
+    /// A place of the same thing from which light comes to `exit`; `None` when the line met nothing that sends any.
+    pub fn entry(&self, world: &World, exit: &Point, random: &mut Random) -> Option<Entry> {
+        let (x, y) = exit.normal.any_orthonormal_pair();
+        let axes = [exit.normal, x, y];
+        let axis = [0, 0, 1, 2][random.choice(4)];
+        let ball = world.balls[exit.thing()];
+        let (center, radius) = match random.unit() < ANYWHERE {
+            true => (ball.center, ball.radius * random.unit().sqrt()),
+            false => (exit.p, self.profiles[random.choice(3)].sample(random.unit())?),
+        };
+        let (sin, cos) = (2.0 * PI * random.unit()).sin_cos();
+        let through = center + radius * (cos * axes[(axis + 1) % 3] + sin * axes[(axis + 2) % 3]);
+        let mut entries: Vec<Entry> = world
+            .along(exit.thing(), through, axes[axis])
+            .into_iter()
+            .filter_map(|point| {
+                let offset = point.p - exit.p;
+                let density = self.density(axes, offset, point.flat, ball);
+                // At no distance R_d is infinite, and no line comes upon a triangle from its edge: both have no chance.
+                (offset != DVec3::ZERO && density > 0.0).then(|| Entry { point, weight: self.r_d(offset) / density })
+            })
+            .filter(|entry| entry.weight != Rgb::ZERO)
+            .collect();
+        let last = entries.len().checked_sub(1)?;
+        let total: f64 = entries.iter().map(|entry| entry.weight.element_sum()).sum();
+        let mut sought = random.unit() * total;
+        let place = entries.iter().position(|entry| {
+            sought -= entry.weight.element_sum();
+            sought < 0.0
+        });
+        let mut entry = entries.swap_remove(place.unwrap_or(last));
+        entry.weight *= total / entry.weight.element_sum();
+        Some(entry)
+    }
+
+    fn r_d(&self, offset: DVec3) -> Rgb {
+        let r = offset.length();
+        Rgb::from_array(self.profiles.each_ref().map(|profile| profile.r_d_tabulated(r)))
+    }
+
+    /// The density per area with which lines along all axes, at radii of all channels, find a place of that normal.
+    fn density(&self, axes: [DVec3; 3], offset: DVec3, normal: DVec3, ball: Ball) -> f64 {
+        let anywhere = ANYWHERE / (PI * ball.radius * ball.radius);
+        let by_axis = |(axis, chance): (DVec3, f64)| {
+            let facing = chance * axis.dot(normal).abs();
+            if facing == 0.0 {
+                // Even where the density of radii is infinite.
+                return 0.0;
+            }
+            let radius = offset.cross(axis).length();
+            let own = self.profiles.iter().map(|profile| profile.pdf(radius)).sum::<f64>() / 3.0;
+            facing * ((1.0 - ANYWHERE) * own + anywhere)
+        };
+        axes.into_iter().zip(CHANCES).map(by_axis).sum()
+    }
+}
