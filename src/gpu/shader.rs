@@ -70,8 +70,11 @@ struct Known {
     /// By the name of the joined text: for good.
     checked: HashMap<Key, Result<Shader, Problem>>,
     /// By file and flags: as the files were when they were last looked at. A plan asks for the same few over and over.
-    loaded: HashMap<String, Vec<(Vec<String>, Result<Shader, Problem>)>>,
+    loaded: HashMap<String, Vec<Loaded>>,
 }
+
+/// What came of a file with these flags.
+type Loaded = (Vec<String>, Result<Shader, Problem>);
 
 /// The last good shader for each name with its flags, and the first problem of one that it stood in for.
 #[derive(Default)]

@@ -35,7 +35,7 @@ use crate::scene::{Camera, LightKind, Object, Part, Scene, Sky, Substance, shape
 use crate::store::{Bake, Key, Plan, Run, Slot, Step};
 use bssrdf::Bssrdf;
 use film::{Film, Moments};
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DVec3};
 use light::{Kind, Lamp, SkyImage};
 use random::Random;
 use rayon::prelude::*;
@@ -213,7 +213,7 @@ impl Step for BuildTracer {
             .map(|placed| Thing {
                 mesh: run.get(placed.mesh),
                 world_from_object: placed.world_from_object,
-                turn: DMat3::from(placed.world_from_object.matrix3),
+                turn: placed.world_from_object.matrix3,
                 matter: placed.matter.clone(),
             })
             .collect();

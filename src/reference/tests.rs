@@ -6,6 +6,7 @@ use crate::optics::fresnel::{fresnel_dielectric, refracted_cosine};
 use crate::optics::half_space::HalfSpace;
 use crate::optics::phase::Phase;
 use crate::scene::Varying;
+use glam::DMat3;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
