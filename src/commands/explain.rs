@@ -88,7 +88,7 @@ impl Fate {
 }
 
 /// The chapters in the order of light, and the steps that open them. Any other step belongs to the chapter that is open.
-const CHAPTERS: [(&str, &[&str]); 6] = [
+const CHAPTERS: [(&str, &[&str]); 7] = [
     ("The shapes", &["geometry."]),
     ("What the camera sees of them", &["frame.gbuffer"]),
     ("Which light reaches what", &["frame.shadow", "frame.visibility", "sky."]),
@@ -97,7 +97,8 @@ const CHAPTERS: [(&str, &[&str]); 6] = [
         "Light that did not: mirrored, or straight through",
         &["gloss.", "frame.openness", "frame.gloss", "frame.through"],
     ),
-    ("The picture", &["frame.compose", "frame.resolve", "frame.image"]),
+    ("Light that is followed, path by path", &["reference.world"]),
+    ("The picture", &["frame.compose", "frame.resolve", "frame.image", "reference.picture"]),
 ];
 
 fn story(scene: &Scene, look: &Look, plan: &Plan, states: &[State]) -> String {
@@ -115,11 +116,14 @@ fn story(scene: &Scene, look: &Look, plan: &Plan, states: &[State]) -> String {
         },
     );
     text += &format!(
-        "It takes {}: {} come from disk, {} have to be made, and {} passes are drawn.\n",
+        "It takes {}: {} come from disk, {} have to be made, and {} drawn.\n",
         counted(fates.len(), "step"),
         counted(count(Fate::OnDisk), "bake"),
         if count(Fate::Baked) == 0 { "none".into() } else { count(Fate::Baked).to_string() },
-        count(Fate::Drawn),
+        match count(Fate::Drawn) {
+            1 => "1 pass is".into(),
+            passes => format!("{passes} passes are"),
+        },
     );
 
     // Chapters only go forwards, whatever the order of the steps within them.
