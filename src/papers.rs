@@ -71,6 +71,14 @@ pub const PAPERS: &[Paper] = &[
         "R. Ramamoorthi & P. Hanrahan. An Efficient Representation for Irradiance Environment Maps. SIGGRAPH 2001",
     ),
     paper(
+        "Takahasi1974",
+        "H. Takahasi & M. Mori. Double Exponential Formulas for Numerical Integration. Publ. RIMS 9(3), 1974",
+    ),
+    paper(
+        "Thurmer1998",
+        "G. Thürmer & C. Wüthrich. Computing Vertex Normals from Polygonal Facets. Journal of Graphics Tools 3(1), 1998",
+    ),
+    paper(
         "Tomaszewska2012",
         "A. Tomaszewska & K. Stefanowski. Real-Time Spherical Harmonics Based Subsurface Scattering. ICIAR 2012",
     ),
@@ -78,6 +86,10 @@ pub const PAPERS: &[Paper] = &[
     paper(
         "Walter2009",
         "B. Walter, S. Zhao, N. Holzschuch & K. Bala. Single Scattering in Refractive Media with Triangle Mesh Boundaries. SIGGRAPH 2009",
+    ),
+    paper(
+        "Wang2004",
+        "Z. Wang, A. Bovik, H. Sheikh & E. Simoncelli. Image Quality Assessment: From Error Visibility to Structural Similarity. IEEE TIP 13(4), 2004",
     ),
     paper("Wilkie2014", "A. Wilkie et al. Hero Wavelength Spectral Sampling. EGSR 2014"),
 ];

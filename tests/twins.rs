@@ -248,15 +248,16 @@ fn every_twin_has_its_partner() {
 /// The levels that a window shows, by pixel, and those of a PNG.
 fn levels(curve: Tone, exposure_ev: f32) -> (Vec<[u8; 3]>, Vec<[u8; 3]>) {
     let mut studio = studio();
+    studio.write("paint.ron", "Material(version: 1, medium: Opaque(albedo: 0.9))");
     // From black far into white, coloured light on one side.
     let scene = studio.scene(
-        r#"camera: (eye: (0, 0, 5)),
+        r#"mm_per_unit: 10, camera: (eye: (0, 0, 5)),
         lights: [
             Directional(direction: (-1, -0.4, -0.2), irradiance: (60, 20, 1)),
             Directional(direction: (1, 0.2, -0.6), irradiance: (0.02, 0.3, 0.9), shadow: false),
             Environment(radiance: (0.001, 0.004, 0.002)),
         ],
-        objects: [(name: "ball", mesh: Sphere(radius: 1, subdivisions: 4))],
+        objects: [(name: "ball", mesh: Sphere(radius: 1, subdivisions: 4), material: "paint.ron")],
         view: (technique: Opaque(), size: (64, 48), antialias: 2)"#,
     );
     let look = Look::of(&scene);

@@ -66,7 +66,7 @@ fn a_view_can_be_the_truth_and_an_object_cannot() {
     desk.run(&["render", "scene.ron", "-o", "a.exr", "--technique", "Reference(max_error: 0)"])
         .fails(2, &["max_error", "above 0"]);
     let object = "objects.ball.technique=Reference()";
-    desk.run(&["check", "scene.ron", "--set", object]).fails(2, &["cannot be overridden"]);
+    desk.run(&["check", "scene.ron", "--set", object]).fails(2, &["objects[0].technique", "name it in the view"]);
 }
 
 #[test]

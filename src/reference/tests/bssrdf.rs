@@ -156,7 +156,7 @@ fn what_is_dense_and_white_is_white_paint() {
 
 /// A knot in sun and sky, whose sizes are multiplied by `size` and whose units are divided by it.
 fn picture(size: f64, integrator: Integrator, threads: usize) -> (crate::store::Key, Film) {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = tempfile::tempdir().expect("a folder can be made");
     let (eye, radius, tube) = (5.0 * size, size, 0.3 * size);
     let text = format!(
         r#"Scene(version: 1, mm_per_unit: {:?}, camera: (eye: (0, 0, {eye:?}), fov_y_deg: 36),
@@ -165,9 +165,10 @@ fn picture(size: f64, integrator: Integrator, threads: usize) -> (crate::store::
         2.0 / size
     );
     let path = folder.path().join("scene.ron");
-    std::fs::write(&path, text).unwrap();
-    std::fs::write(folder.path().join("marble.ron"), r#"Material(version: 1, medium: Preset("marble"))"#).unwrap();
-    let (scene, _) = Reader::new(Arc::new(Files::default())).scene(&path, &[]).unwrap();
+    std::fs::write(&path, text).expect("a file can be written");
+    let marble = r#"Material(version: 1, medium: Preset("marble"))"#;
+    std::fs::write(folder.path().join("marble.ron"), marble).expect("a file can be written");
+    let (scene, _) = Reader::new(Arc::new(Files::default())).scene(&path, &[]).expect("the scene is valid");
     let settings = Settings {
         integrator,
         light: Light::Full,
@@ -180,8 +181,8 @@ fn picture(size: f64, integrator: Integrator, threads: usize) -> (crate::store::
     };
     let mut plan = Plan::default();
     let slot = super::plan(&mut plan, &scene, &settings, 8);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    let film = pool.install(|| Store::in_memory().get(&plan, slot).unwrap());
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be had");
+    let film = pool.install(|| Store::in_memory().get(&plan, slot).expect("paths end"));
     (slot.key(), film.as_ref().clone())
 }
 
