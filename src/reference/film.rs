@@ -1,6 +1,6 @@
 //! What samples add up to: mean and variance of every pixel, by part.
 
-use super::volume::Parts;
+use super::path::Parts;
 use crate::image::Image;
 use crate::optics::Rgb;
 use crate::scene::Part;

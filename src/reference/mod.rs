@@ -10,6 +10,7 @@
 //! | [`refracted`] | lamps without extent, seen from inside through a smooth boundary |
 //! | [`light`] | lamps and the surroundings |
 //! | [`world`] | the scene as rays see it |
+//! | [`path`] | a path on its way: what it lies in and what it weighs |
 //! | [`film`] | means, variances, parts, tiles |
 //!
 //! Samples are added in steps that double their number; each step is a bake, named by the one before, so that what was
@@ -21,6 +22,7 @@ pub mod boundary;
 pub mod bssrdf;
 pub mod film;
 pub mod light;
+pub mod path;
 pub mod random;
 pub mod refracted;
 mod surfaces;
@@ -37,12 +39,13 @@ use bssrdf::Bssrdf;
 use film::{Film, Moments};
 use glam::{DAffine3, DVec3};
 use light::{Kind, Lamp, SkyImage};
+use path::Inside;
 use random::Random;
 use rayon::prelude::*;
 use refracted::Refracted;
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use volume::{Inside, Light, Tracer};
+use volume::{Light, Tracer};
 use world::{Boundary, Matter, Medium, Thing, World};
 
 /// What light does below a surface.

@@ -51,7 +51,7 @@ fn measure(
     tracer: &Tracer,
     paths: u64,
     ray: impl Fn(&mut Random) -> (DVec3, DVec3) + Sync,
-    part: impl Fn(&volume::Parts) -> Rgb + Sync,
+    part: impl Fn(&path::Parts) -> Rgb + Sync,
 ) -> (Rgb, Rgb) {
     let sums: Vec<(Rgb, Rgb)> = (0..64u64)
         .into_par_iter()
@@ -86,7 +86,7 @@ fn agree(what: &str, (mean, error): (Rgb, Rgb), expected: Rgb) {
     );
 }
 
-fn total(parts: &volume::Parts) -> Rgb {
+fn total(parts: &path::Parts) -> Rgb {
     parts.scattered + parts.glossy + parts.unscattered
 }
 

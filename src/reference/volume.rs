@@ -10,6 +10,7 @@
 
 use super::boundary::Facing;
 use super::light::{Lamp, Ray, Sky};
+use super::path::{Inside, Parts, Sum, Walk, Weight};
 use super::random::Random;
 use super::refracted::Refracted;
 use super::surfaces::Bounce;
@@ -29,14 +30,6 @@ pub enum Light {
     Full,
 }
 
-/// What one path brings, by part.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Parts {
-    pub scattered: Rgb,
-    pub glossy: Rgb,
-    pub unscattered: Rgb,
-}
-
 /// All that a path needs to know.
 pub struct Tracer {
     pub world: World,
@@ -52,105 +45,11 @@ pub struct Tracer {
     pub joins: bool,
 }
 
-/// The things in which a point lies, innermost last.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Inside {
-    things: [u32; 4],
-    count: usize,
-}
-
-impl Inside {
-    fn innermost(&self) -> Option<usize> {
-        self.count.checked_sub(1).map(|last| self.things[last] as usize)
-    }
-
-    /// Things that lie in one another more than four deep count as four.
-    pub fn with(mut self, thing: usize) -> Inside {
-        if self.count < self.things.len() {
-            self.things[self.count] = thing as u32;
-            self.count += 1;
-        }
-        self
-    }
-
-    pub fn without(mut self, thing: usize) -> Inside {
-        if let Some(place) = self.things[..self.count].iter().rposition(|t| *t as usize == thing) {
-            self.things.copy_within(place + 1..self.count, place);
-            self.count -= 1;
-        }
-        self
-    }
-}
-
-/// Weights of a path whose free paths are drawn for one channel.
-#[derive(Clone, Copy)]
-struct Weight {
-    /// What a path's light is multiplied by.
-    value: Rgb,
-    /// The density with which each channel would have drawn this path, over their mean.
-    density: Rgb,
-    hero: usize,
-}
-
-impl Weight {
-    fn new(random: &mut Random) -> Weight {
-        Weight { value: Rgb::ONE, density: Rgb::ONE, hero: random.choice(3) }
-    }
-
-    /// The density of all channels together of a choice that each would make with these densities.
-    fn mixed(&self, density: Rgb) -> f64 {
-        (self.density * density).element_sum() / self.density.element_sum()
-    }
-
-    /// After an event that has these values and, if drawn for each channel, these densities.
-    fn event(&mut self, value: Rgb, density: Rgb) {
-        let density = self.density * density;
-        let mean = density.element_sum() / 3.0;
-        self.value *= value / mean;
-        self.density = density / mean;
-    }
-}
-
-/// A path on its way.
-struct Walk {
-    origin: DVec3,
-    direction: DVec3,
-    on: Option<Place>,
-    inside: Inside,
-    weight: Weight,
-    /// Of `direction`, where a lamp could have been joined to the path's last vertex instead.
-    density: Option<f64>,
-    /// Whether what shines along this ray, in the open, was added already.
-    counted: bool,
-    /// Multiplies the light once it has scattered.
-    color: Rgb,
-    scattered: bool,
-    depth: u32,
-    sum: Sum,
-}
-
-/// Light by whether it was scattered.
-#[derive(Clone, Copy, Default)]
-struct Sum {
-    scattered: Rgb,
-    unscattered: Rgb,
-}
-
-impl Walk {
-    fn add(&mut self, light: Rgb) {
-        let light = self.weight.value * light;
-        match self.scattered {
-            true => self.sum.scattered += self.color * light,
-            false => self.sum.unscattered += light,
-        }
-    }
-}
-
 impl Tracer {
     /// One path from the eye, which lies inside the things `inside`; and whether it meets an object.
     pub fn trace(&self, eye: DVec3, direction: DVec3, inside: Inside, random: &mut Random) -> (Parts, bool) {
         let mut parts = Parts::default();
-        if inside.count > 0 {
+        if !inside.is_nothing() {
             // From within a medium there is no boundary to split at.
             let light = self.walk_from(self.start(eye, direction, None, inside, random), None, random);
             (parts.scattered, parts.unscattered) = (light.scattered, light.unscattered);
@@ -399,7 +298,7 @@ impl Tracer {
         let mut is_out = false;
         loop {
             let met = self.world.meet(p, ray.direction, left * (1.0 - 1e-9), on);
-            if inside.count > 0 {
+            if !inside.is_nothing() {
                 let length = met.as_ref().map_or(left, |point| point.t);
                 through *= (-self.sigma_t(inside) * length).exp();
             }
@@ -429,7 +328,7 @@ impl Tracer {
         let surface = match &thing.matter {
             // In the open it was counted where the ray was cast.
             Matter::Emitter(_) => {
-                if walk.inside.count > 0
+                if !walk.inside.is_nothing()
                     && let Some((radiance, own)) = self.emitted(&point, d)
                 {
                     let share = walk.density.filter(|_| self.joins).map_or(1.0, |density| density / (density + own));
@@ -438,7 +337,7 @@ impl Tracer {
                 return false;
             }
             Matter::Bssrdf { surface, .. } => return self.turn(walk, thing, surface, &point, random),
-            Matter::Opaque { surface, .. } if walk.inside.count == 0 => {
+            Matter::Opaque { surface, .. } if walk.inside.is_nothing() => {
                 return self.turn(walk, thing, surface, &point, random);
             }
             Matter::Opaque { surface, albedo } => {
