@@ -26,6 +26,7 @@ mod pace;
 mod panel;
 mod screen;
 mod stage;
+mod telling;
 mod window;
 mod worker;
 

@@ -14,7 +14,7 @@ use crate::problem::{Cause, Problem, Problems};
 use crate::render;
 use crate::scene::{Camera, Reader, TechniqueText};
 use crate::store::{Files, Finished, Follow, Key, Origin};
-use serde_json::{Value, json};
+use serde_json::json;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -81,18 +81,18 @@ pub(super) struct Preview {
     times: Times,
     drawn: Option<Drawn>,
     /// What the worker made since the last picture.
-    made: Vec<Finished>,
+    pub made: Vec<Finished>,
     warnings: Vec<Problem>,
     /// A choice that is not possible with this scene.
     pub refused: Problems,
     /// The problems that were told last.
-    told: Problems,
+    pub told: Problems,
     pub note: Option<(Instant, String)>,
     /// When it began, and the scene's time then.
     pub playing: Option<(Instant, f64)>,
     pub capture: Option<PathBuf>,
     told_picture: Option<Key>,
-    told_waiting: bool,
+    pub told_waiting: bool,
     pub frames: u64,
     /// Whether the device was opened anew and has drawn nothing yet.
     rebuilt: bool,
@@ -437,56 +437,6 @@ impl Preview {
             _ => self.drawn = Some(drawn),
         }
     }
-
-    fn tell_picture(&mut self, screen: &Screen, drawn: &Drawn, whole: bool) {
-        self.told_waiting &= !drawn.current;
-        let texture = &drawn.picture.0[0];
-        let Ok(levels) = screen.gpu.read_texture(texture) else { return }; // a lost device is noticed by the next frame
-        let made = std::mem::take(&mut self.made);
-        let of = |origin: Origin| made.iter().filter(|step| step.origin == origin).count();
-        self.channel.say(
-            "drawn",
-            json!({
-                "picture": Key::of_bytes(&levels).to_string(),
-                "width": texture.shape.width,
-                "height": texture.shape.height,
-                "current": drawn.current,
-                "whole": whole,
-                "steps": { "run": drawn.steps.ran, "reused": drawn.steps.reused, "unneeded": drawn.steps.unneeded },
-                "bakes": { "run": of(Origin::Ran), "disk": of(Origin::Disk) },
-                "ms": 1e3 * drawn.time.as_secs_f64(),
-            }),
-        );
-    }
-
-    fn tell_waiting(&mut self) {
-        if let Some(progress) = self.stage.progress()
-            && !std::mem::replace(&mut self.told_waiting, true)
-        {
-            self.channel.say("baking", json!({ "about": progress.about }));
-        }
-    }
-
-    pub fn problems(&self) -> Problems {
-        Problems(self.stage.problems().0.into_iter().chain(self.refused.0.iter().cloned()).collect())
-    }
-
-    fn tell_problems(&mut self) {
-        let problems = self.problems();
-        if problems == self.told {
-            return;
-        }
-        match problems.0.is_empty() {
-            true => self.channel.say("mended", json!({})),
-            false => self.channel.say("problem", json!({ "problems": list(&problems) })),
-        }
-        self.told = problems;
-        self.redraw_soon();
-    }
-}
-
-pub(super) fn list(problems: &Problems) -> Value {
-    problems.0.iter().map(Problem::json).collect()
 }
 
 impl ApplicationHandler<Brought> for Preview {
