@@ -116,13 +116,13 @@ fn story(scene: &Scene, look: &Look, plan: &Plan, states: &[State]) -> String {
         },
     );
     text += &format!(
-        "It takes {}: {} come from disk, {} have to be made, and {} drawn.\n",
+        "It takes {}: {} from disk, {} to be made, and {} drawn.\n",
         counted(fates.len(), "step"),
         counted(count(Fate::OnDisk), "bake"),
         if count(Fate::Baked) == 0 { "none".into() } else { count(Fate::Baked).to_string() },
         match count(Fate::Drawn) {
-            1 => "1 pass is".into(),
-            passes => format!("{passes} passes are"),
+            1 => "1 pass to be".into(),
+            passes => format!("{passes} passes to be"),
         },
     );
 
