@@ -51,8 +51,8 @@ use world::{Boundary, Matter, Medium, Thing, World};
 /// What light does below a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 pub enum Integrator {
-    #[default]
     /// It is followed: the truth.
+    #[default]
     Volume,
     /// The material's profile says how far it goes: what that model makes when nothing else is approximated.
     Bssrdf,
@@ -72,35 +72,21 @@ pub struct Settings {
     pub rows: (u32, u32),
 }
 
-/// Adds the steps that bring the picture to `samples` per pixel: one for each doubling.
+/// Adds the steps that bring the picture to `samples` per pixel, at least 1: a step for each doubling.
 pub fn plan(plan: &mut Plan, scene: &Scene, settings: &Settings, samples: u64) -> Slot<Film> {
     let tracer = tracer(plan, scene, settings);
-    let mut film = None;
-    let mut done = 0;
+    let mut more = |samples, before| {
+        let Settings { camera, size, seed, rows, .. } = *settings;
+        plan.bake(Trace { tracer, camera, size, seed, rows, samples, before })
+    };
+    let mut film = more((0, 1), None);
+    let mut done = 1;
     while done < samples {
-        let upto = (2 * done).max(1).min(samples);
-        film = Some(plan.bake(Trace {
-            tracer,
-            camera: settings.camera,
-            size: settings.size,
-            seed: settings.seed,
-            rows: settings.rows,
-            samples: (done, upto),
-            before: film,
-        }));
+        let upto = (2 * done).min(samples);
+        film = more((done, upto), Some(film));
         done = upto;
     }
-    film.unwrap_or_else(|| {
-        plan.bake(Trace {
-            tracer,
-            camera: settings.camera,
-            size: settings.size,
-            seed: settings.seed,
-            rows: settings.rows,
-            samples: (0, 1),
-            before: None,
-        })
-    })
+    film
 }
 
 fn tracer(plan: &mut Plan, scene: &Scene, settings: &Settings) -> Slot<Tracer> {
