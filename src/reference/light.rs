@@ -47,25 +47,29 @@ pub struct Ray {
 }
 
 impl Lamp {
-    /// Light that reaches `p`; `None` from the dark side of an area light.
-    pub fn sample(&self, p: DVec3, random: &mut Random) -> Option<Ray> {
-        Some(match self.kind {
+    /// Light of a lamp without extent that reaches `p`; none for one with extent.
+    pub fn ray(&self, p: DVec3) -> Option<Ray> {
+        match self.kind {
             Kind::Directional { direction, irradiance } => {
-                Ray { direction: -direction, distance: f64::INFINITY, irradiance, density: None }
+                Some(Ray { direction: -direction, distance: f64::INFINITY, irradiance, density: None })
             }
             Kind::Point { position, intensity } => {
                 let to = position - p;
                 let irradiance = intensity / to.length_squared();
-                Ray { direction: to.normalize(), distance: to.length(), irradiance, density: None }
+                Some(Ray { direction: to.normalize(), distance: to.length(), irradiance, density: None })
             }
-            Kind::Rect { center, u, v, radiance } => {
-                let (a, b) = random.pair();
-                let to = center + (2.0 * a - 1.0) * u + (2.0 * b - 1.0) * v - p;
-                let direction = to.normalize();
-                let density = rect_density(u, v, to)?;
-                Ray { direction, distance: to.length(), irradiance: radiance / density, density: Some(density) }
-            }
-        })
+            Kind::Rect { .. } => None,
+        }
+    }
+
+    /// Light that reaches `p`; none from the dark side of an area light.
+    pub fn sample(&self, p: DVec3, random: &mut Random) -> Option<Ray> {
+        let Kind::Rect { center, u, v, radiance } = self.kind else { return self.ray(p) };
+        let (a, b) = random.pair();
+        let to = center + (2.0 * a - 1.0) * u + (2.0 * b - 1.0) * v - p;
+        let direction = to.normalize();
+        let density = rect_density(u, v, to)?;
+        Some(Ray { direction, distance: to.length(), irradiance: radiance / density, density: Some(density) })
     }
 
     /// For an area light that a ray meets at `to` from its start: its radiance, and the density of that direction in

@@ -8,6 +8,7 @@
 //! | [`surfaces`] | what surfaces do that paths do not enter |
 //! | [`boundary`] | reflection and refraction, smooth and rough |
 //! | [`refracted`] | lamps without extent, seen from inside through a smooth boundary |
+//! | [`lobe`] | the same through a rough one |
 //! | [`light`] | lamps and the surroundings |
 //! | [`world`] | the scene as rays see it |
 //! | [`path`] | a path on its way: what it lies in and what it weighs |
@@ -22,6 +23,7 @@ pub mod boundary;
 pub mod bssrdf;
 pub mod film;
 pub mod light;
+pub mod lobe;
 pub mod path;
 pub mod random;
 pub mod refracted;

@@ -25,6 +25,11 @@ impl Inside {
         self.count.checked_sub(1).map(|last| self.things[last] as usize)
     }
 
+    /// The thing, if there is one alone.
+    pub fn only(&self) -> Option<usize> {
+        self.innermost().filter(|_| self.count == 1)
+    }
+
     pub fn is_nothing(&self) -> bool {
         self.count == 0
     }
@@ -87,6 +92,9 @@ pub struct Walk {
     pub density: Option<f64>,
     /// Whether what shines along this ray, in the open, was added already.
     pub counted: bool,
+    /// The thing in which the path was scattered last and where, as long as it has not met a surface since: there lamps
+    /// without extent were joined to it.
+    pub lobes: Option<(usize, DVec3)>,
     /// Multiplies the light once it has scattered.
     pub color: Rgb,
     pub scattered: bool,

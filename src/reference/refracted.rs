@@ -11,6 +11,7 @@
 
 use super::boundary::Facing;
 use super::light::Kind;
+use super::random::Random;
 use super::world::{Boundary, Matter, Place, Thing, World};
 use crate::optics::Rgb;
 use glam::{DVec2, DVec3, Vec3A};
@@ -28,8 +29,8 @@ pub struct Refracted {
     ior: f64,
     triangles: Vec<Triangle>,
     tree: Bvh2,
-    /// The triangle of each piece.
-    pieces: Vec<u32>,
+    /// The triangle of each piece, and how far below the boundary it begins.
+    pieces: Vec<(u32, f64)>,
     /// Tree coordinates are (world - center) / scale.
     center: DVec3,
     scale: f64,
@@ -41,23 +42,30 @@ struct Triangle {
     corners: [DVec3; 3],
     normals: [DVec3; 3],
     flat: DVec3,
+    /// How much the beam's direction changes over the triangle at most.
+    across: f64,
+    /// The shortest of its heights.
+    height: f64,
 }
 
 /// Attenuation beyond which light is below f64's own rounding against what comes the short way.
 const FAINTEST: f64 = 36.0;
 
+/// Light within so many mean free paths is always found.
+const SURE: f64 = 2.0;
+
 /// At most so many pieces a triangle.
 const PIECES: usize = 64;
 
 impl Refracted {
-    /// None where no light is refracted: an index of 1, a rough boundary, a lamp with extent.
+    /// None where no light is refracted by a smooth boundary: an index of 1, a rough one ([`super::lobe`]), a lamp with extent.
     pub fn new(world: &World, lamp: usize, kind: &Kind, thing: usize) -> Option<Refracted> {
         let Matter::Translucent { surface, medium } = &world.things[thing].matter else { return None };
         if surface.ior == 1.0 || matches!(kind, Kind::Rect { .. }) || !is_smooth(surface) {
             return None;
         }
         let body = &world.things[thing];
-        let triangles: Vec<Triangle> = (0..body.mesh.triangles.len())
+        let mut triangles: Vec<Triangle> = (0..body.mesh.triangles.len())
             .filter_map(|t| Triangle::new(body, thing, t))
             .filter(|triangle| kind.towards(triangle.corners[0]).dot(triangle.flat) < 0.0)
             .collect();
@@ -74,17 +82,29 @@ impl Refracted {
         let sigma = medium.sigma_t().min_element();
         let reach = if sigma > 0.0 { diagonal.min(FAINTEST / sigma) } else { diagonal };
         let (center, scale) = (0.5 * (min + max), (max - min).max_element().max(f64::MIN_POSITIVE));
-        let boxed: Vec<Vec<Aabb>> =
-            triangles.par_iter().map(|t| t.pieces(kind, surface.ior, reach, center, scale)).collect();
-        let pieces = boxed.iter().enumerate().flat_map(|(i, boxes)| boxes.iter().map(move |_| i as u32)).collect();
-        let boxes: Vec<Aabb> = boxed.into_iter().flatten().collect();
+        let boxed: Vec<Vec<(Aabb, f64)>> =
+            triangles.par_iter_mut().map(|t| t.pieces(kind, surface.ior, reach, center, scale)).collect();
+        let pieces = boxed.iter().enumerate();
+        let pieces = pieces.flat_map(|(i, boxes)| boxes.iter().map(move |(_, near)| (i as u32, *near))).collect();
+        let boxes: Vec<Aabb> = boxed.into_iter().flatten().map(|(b, _)| b).collect();
         let tree = build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut Default::default());
         Some(Refracted { lamp, thing, kind: kind.clone(), ior: surface.ior, triangles, tree, pieces, center, scale })
     }
 
-    /// Calls `found` for every direction from `p`, inside the thing, in which the boundary shows the lamp: the direction
-    /// towards it, and irradiance on a particle there, per squared index.
-    pub fn each(&self, world: &World, p: DVec3, sigma_t: Rgb, shadow: bool, mut found: impl FnMut(DVec3, Rgb)) {
+    /// Calls `found` for directions from `p`, inside the thing, in which the boundary shows the lamp: the direction
+    /// towards it, and irradiance on a particle there, per squared index. What is far below the boundary finds it the more
+    /// rarely the fainter it is, and then as much brighter.
+    pub fn each(
+        &self,
+        world: &World,
+        p: DVec3,
+        sigma_t: Rgb,
+        shadow: bool,
+        random: &mut Random,
+        mut found: impl FnMut(DVec3, Rgb),
+    ) {
+        let sigma = sigma_t.min_element();
+        let reach = if sigma > 0.0 { (SURE + random.exponential()) / sigma } else { f64::INFINITY };
         let local = ((p - self.center) / self.scale).as_vec3a();
         // The pieces of one triangle overlap: each triangle counts once.
         let mut seen: [u32; 256] = [u32::MAX; 256];
@@ -93,7 +113,10 @@ impl Refracted {
         self.tree.point_traverse(local, |tree, node| {
             let node = &tree.nodes[node as usize];
             for i in node.first_index..node.first_index + node.prim_count {
-                let triangle = self.pieces[tree.primitive_indices[i as usize] as usize];
+                let (triangle, near) = self.pieces[tree.primitive_indices[i as usize] as usize];
+                if near > reach || !self.triangles[triangle as usize].may_light(&self.kind, self.ior, p) {
+                    continue;
+                }
                 if seen[..count].contains(&triangle) || far.contains(&triangle) {
                     continue;
                 }
@@ -110,8 +133,12 @@ impl Refracted {
         for &i in seen[..count].iter().chain(&far) {
             let triangle = &self.triangles[i as usize];
             let Some(at) = triangle.solve(&self.kind, self.ior, p) else { continue };
+            let length = triangle.point(at).distance(p);
+            if length > reach {
+                continue;
+            }
             if let Some((direction, light)) = self.light(world, triangle, at, p, sigma_t, shadow) {
-                found(direction, light);
+                found(direction, light * (sigma * length - SURE).max(0.0).exp());
             }
         }
     }
@@ -204,6 +231,8 @@ impl Triangle {
             normals: body.mesh.triangles[t]
                 .map(|v| (body.turn * body.mesh.normals[v as usize].as_dvec3()).normalize_or(at[0].0)),
             flat: at[0].0,
+            across: 0.0,
+            height: (b - a).cross(c - a).length() / a.distance(b).max(b.distance(c)).max(c.distance(a)),
         })
     }
 
@@ -241,16 +270,16 @@ impl Triangle {
         self.facing(at, 1.0, ior).split(kind.towards(self.point(at))).refracted
     }
 
-    /// Boxes around the beam, piece by piece, in tree coordinates.
-    fn pieces(&self, kind: &Kind, ior: f64, reach: f64, center: DVec3, scale: f64) -> Vec<Aabb> {
+    /// Boxes around the beam, piece by piece, in tree coordinates, and how far below the boundary each begins.
+    fn pieces(&mut self, kind: &Kind, ior: f64, reach: f64, center: DVec3, scale: f64) -> Vec<(Aabb, f64)> {
         let corners = [DVec2::ZERO, DVec2::X, DVec2::Y];
         let Some(beams) = corners.iter().map(|at| self.beam(kind, ior, *at)).collect::<Option<Vec<DVec3>>>() else {
             return Vec::new();
         };
         let apart = |i: usize, j: usize| beams[i].distance(beams[j]);
         // Directions in between lie on an arc, not on the chord: this far off at most, with room to spare.
-        let widest = apart(0, 1).max(apart(1, 2)).max(apart(2, 0));
-        let bulge = widest * widest;
+        self.across = apart(0, 1).max(apart(1, 2)).max(apart(2, 0));
+        let bulge = self.across * self.across;
         let size = self.corners[0].distance(self.corners[1]).max(self.corners[0].distance(self.corners[2]));
         let count = ((reach / (2.0 * size)).ceil() as usize).clamp(1, PIECES);
         let along = |i: usize, s: f64| self.corners[i] + s * beams[i];
@@ -264,9 +293,20 @@ impl Triangle {
                 let b = Aabb::from_points(&points);
                 // And f32's rounding.
                 let room = (bulge * far / scale) as f32 + 1e-5;
-                Aabb::new(b.min - room, b.max + room)
+                (Aabb::new(b.min - room, b.max + room), near)
             })
             .collect()
+    }
+
+    /// Whether `p` may lie in the beam at all. Were the beam the same everywhere, this would say it; by how much it is not
+    /// says how far off that can be.
+    fn may_light(&self, kind: &Kind, ior: f64, p: DVec3) -> bool {
+        let Some(beam) = self.beam(kind, ior, DVec2::splat(1.0 / 3.0)) else { return true };
+        let down = -beam.dot(self.flat);
+        let s = (self.corners[0] - p).dot(self.flat) / down;
+        let at = self.barycentrics(p - s * beam);
+        let room = 1.5 * self.across * s / (down * self.height) + 1e-3;
+        s > 0.0 && at.min_element() >= -room && at.element_sum() <= 1.0 + room
     }
 
     /// The place on the triangle whose beam goes through `p`.

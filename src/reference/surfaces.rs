@@ -54,9 +54,9 @@ impl Tracer {
             let split = facing.split(d);
             return bounce(Rgb::ZERO, split.reflected, split.reflectance, None);
         }
-        let joined = self.joined(point, random, |to| {
-            let (value, density) = facing.value(d, to);
-            if to.dot(point.flat) > 0.0 { (value, density) } else { (0.0, 0.0) }
+        let joined = self.joined(point, random, |_, ray| {
+            let (value, density) = facing.value(d, ray.direction);
+            if ray.direction.dot(point.flat) > 0.0 { (value, density) } else { (0.0, 0.0) }
         });
         let h = facing.microfacet(d, random.pair());
         let split = facing.split_at(d, h);
@@ -92,9 +92,9 @@ impl Tracer {
         let (flat, normal) = (side * point.flat, side * point.normal);
         let enters =
             |cos: f64| (1.0 - fresnel_dielectric(cos.clamp(0.0, 1.0), ior)) / (PI * diffuse_transmittance(ior));
-        let joined = self.joined(point, random, |to| {
-            let cos = to.dot(normal);
-            if cos > 0.0 && to.dot(flat) > 0.0 { (enters(cos) * cos, cos / PI) } else { (0.0, 0.0) }
+        let joined = self.joined(point, random, |_, ray| {
+            let cos = ray.direction.dot(normal);
+            if cos > 0.0 && ray.direction.dot(flat) > 0.0 { (enters(cos) * cos, cos / PI) } else { (0.0, 0.0) }
         });
         let (u, v) = random.pair();
         let (x, y) = normal.any_orthonormal_pair();
@@ -106,11 +106,16 @@ impl Tracer {
     }
 
     /// Light of all lamps and of the sky's image at a point outside, each from one direction: `value` gives a surface's
-    /// value times cosine for a direction, and the density with which the surface itself would have chosen it.
-    pub(super) fn joined(&self, point: &Point, random: &mut Random, value: impl Fn(DVec3) -> (f64, f64)) -> Rgb {
+    /// value times cosine for a ray to a lamp or the sky, and the density with which the surface itself would have chosen it.
+    pub(super) fn joined(
+        &self,
+        point: &Point,
+        random: &mut Random,
+        value: impl Fn(Option<&Lamp>, &Ray) -> (f64, f64),
+    ) -> Rgb {
         let mut sum = Rgb::ZERO;
-        let mut add = |ray: Ray, shadow: bool| {
-            let (value, density) = value(ray.direction);
+        let mut add = |lamp: Option<&Lamp>, ray: Ray, shadow: bool| {
+            let (value, density) = value(lamp, &ray);
             if value > 0.0 && (!shadow || self.reaches(point.p, &ray, Some(point.place))) {
                 let share = ray.density.map_or(1.0, |own| own / (own + density));
                 sum += share * value * ray.irradiance;
@@ -118,11 +123,11 @@ impl Tracer {
         };
         for lamp in self.lamps.iter().filter(|lamp| self.is_joined(lamp)) {
             if let Some(ray) = lamp.sample(point.p, random) {
-                add(ray, lamp.shadow);
+                add(Some(lamp), ray, lamp.shadow);
             }
         }
         if let Some((ray, shadow)) = self.sky_sample(random) {
-            add(ray, shadow);
+            add(None, ray, shadow);
         }
         sum
     }
@@ -137,7 +142,7 @@ impl Tracer {
     }
 
     /// Whether nothing is between a point and a lamp.
-    fn reaches(&self, p: DVec3, ray: &Ray, on: Option<Place>) -> bool {
+    pub(super) fn reaches(&self, p: DVec3, ray: &Ray, on: Option<Place>) -> bool {
         // The lamp itself stands at the end.
         self.world.is_free(p, ray.direction, ray.distance * (1.0 - 1e-9), on)
     }

@@ -4,12 +4,13 @@
 //! refract by Fresnel or by GGX microfacets; nothing is approximated. One path serves three channels: its free paths are
 //! drawn for one of them, and its weight is the balance heuristic over all three (spectral multiple importance sampling
 //! [Wilkie2014]), so that no channel's weight exceeds 3. Lamps are joined to each vertex that can see them; those
-//! without extent also through a smooth refracting boundary ([`super::refracted`]), where no path would find them.
+//! without extent also through a refracting boundary ([`super::refracted`], [`super::lobe`]), where few paths or none would find them.
 //!
 //! Radiance is counted per squared index of the medium that it travels in. Lengths are scene units.
 
 use super::boundary::Facing;
 use super::light::{Lamp, Ray, Sky};
+use super::lobe::Lobe;
 use super::path::{Inside, Parts, Sum, Walk, Weight};
 use super::random::Random;
 use super::refracted::Refracted;
@@ -114,6 +115,7 @@ impl Tracer {
             weight: Weight::new(random),
             density: None,
             counted: false,
+            lobes: None,
             color: Rgb::ONE,
             scattered: false,
             depth: 0,
@@ -263,6 +265,16 @@ impl Tracer {
         if let Some((ray, shadow)) = self.sky_sample(random) {
             self.join(walk, &ray, shadow, phase(ray.direction));
         }
+        if let Some(thing) = walk.inside.only() {
+            let own = |to| walk.weight.mixed(phase(to));
+            for lamp in self.lamps.iter().filter(|lamp| !lamp.has_extent()) {
+                let sigma_t = medium.sigma_t();
+                if let Some((to, light)) = self.through_rough(lamp, thing, walk.origin, sigma_t, own, random) {
+                    walk.sum.scattered += walk.color * walk.weight.value * phase(to) * light;
+                }
+            }
+            walk.lobes = Some((thing, walk.origin));
+        }
         let parameter = medium.parameter[walk.weight.hero];
         walk.direction = around(from, -medium.phase.sample(random.unit(), parameter), random.unit());
         let values = phase(walk.direction);
@@ -281,7 +293,8 @@ impl Tracer {
         let innermost = walk.inside.innermost();
         for (i, lamp) in self.lamps.iter().enumerate().filter(|(_, lamp)| wanted(lamp)) {
             for refracted in self.refracted.iter().filter(|r| r.lamp == i && Some(r.thing) == innermost) {
-                refracted.each(&self.world, walk.origin, self.sigma_t(walk.inside), lamp.shadow, |to, light| {
+                let sigma_t = self.sigma_t(walk.inside);
+                refracted.each(&self.world, walk.origin, sigma_t, lamp.shadow, random, |to, light| {
                     walk.sum.scattered += walk.color * walk.weight.value * phase(to) * light;
                 });
             }
@@ -359,6 +372,7 @@ impl Tracer {
         let facing = self.facing(thing, surface, &point, d, walk.inside);
         (walk.origin, walk.on) = (point.p, Some(point.place));
         if facing.eta == 1.0 {
+            walk.lobes = None;
             // Nothing happens to the path, and lamps could be joined through here.
             walk.inside = beyond;
             if beyond.innermost().is_some() || self.light == Light::Full {
@@ -376,6 +390,7 @@ impl Tracer {
             if beyond.innermost().is_none() {
                 self.join_at(walk, &facing, &point, random);
             }
+            walk.lobes = None;
             let h = facing.microfacet(d, random.pair());
             let split = facing.split_at(d, h);
             let refracted = split.refracted.map_or(0.0, |to| facing.unhidden(d, to, false));
@@ -436,8 +451,17 @@ impl Tracer {
     /// Adds the light of lamps outside at a rough boundary that a path meets from inside.
     fn join_at(&self, walk: &mut Walk, facing: &Facing, point: &Point, random: &mut Random) {
         let d = walk.direction;
-        let light = self.joined(point, random, |to| match to.dot(point.flat) > 0.0 {
-            true => facing.value(d, to),
+        // Lamps that were joined to the path's last vertex through here have their share already.
+        let joined = |lamp: Option<&Lamp>, own: f64| {
+            let (thing, p) = walk.lobes.filter(|(thing, _)| *thing == point.thing())?;
+            Some(Lobe::new(self, lamp?, thing, p, self.sigma_t(walk.inside))?.density(d) / own)
+        };
+        let light = self.joined(point, random, |lamp, ray| match ray.direction.dot(point.flat) > 0.0 {
+            true => {
+                let (value, density) = facing.value(d, ray.direction);
+                let joined = walk.density.filter(|_| value > 0.0).and_then(|own| joined(lamp, own));
+                (value / (1.0 + joined.unwrap_or(0.0)), density)
+            }
             false => (0.0, 0.0),
         });
         walk.add(light);
