@@ -9,7 +9,8 @@
 //! Radiance is counted per squared index of the medium that it travels in. Lengths are scene units.
 
 use super::boundary::Facing;
-use super::light::{Lamp, Ray, Sky};
+use super::guide::{self, Guide};
+use super::light::{Kind, Lamp, Ray, Sky};
 use super::lobe::Lobe;
 use super::path::{Inside, Parts, Sum, Walk, Weight};
 use super::random::Random;
@@ -19,6 +20,7 @@ use super::world::{Boundary, Matter, Medium, Place, Point, Thing, World};
 use crate::optics::Rgb;
 use crate::optics::fresnel::fresnel_dielectric;
 use glam::DVec3;
+use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Which light counts.
@@ -39,6 +41,8 @@ pub struct Tracer {
     /// Which lamp each emitter of the world is.
     pub lamp_of: Vec<Option<usize>>,
     pub refracted: Vec<Refracted>,
+    /// Of each thing.
+    pub guides: Vec<Option<Guide>>,
     pub light: Light,
     pub max_depth: u32,
     /// Whether lamps with extent and the sky are joined to vertices. Without, paths must find them by themselves: the same
@@ -47,6 +51,29 @@ pub struct Tracer {
 }
 
 impl Tracer {
+    pub fn new(
+        world: World,
+        lamps: Vec<Lamp>,
+        sky: Option<Sky>,
+        refracted: Vec<Refracted>,
+        light: Light,
+        max_depth: u32,
+    ) -> Tracer {
+        let lamp_of = world
+            .things
+            .iter()
+            .map(|thing| match thing.matter {
+                Matter::Emitter(lamp) => Some(lamp),
+                _ => None,
+            })
+            .collect();
+        let count = world.things.len();
+        let mut tracer =
+            Tracer { world, lamps, sky, lamp_of, refracted, guides: Vec::new(), light, max_depth, joins: true };
+        tracer.guides = (0..count).into_par_iter().map(|thing| Guide::new(&tracer, thing)).collect();
+        tracer
+    }
+
     /// One path from the eye, which lies inside the things `inside`; and whether it meets an object.
     pub fn trace(&self, eye: DVec3, direction: DVec3, inside: Inside, random: &mut Random) -> (Parts, bool) {
         let mut parts = Parts::default();
@@ -116,6 +143,7 @@ impl Tracer {
             density: None,
             counted: false,
             lobes: None,
+            promise: None,
             color: Rgb::ONE,
             scattered: false,
             depth: 0,
@@ -209,7 +237,17 @@ impl Tracer {
     }
 
     /// Follows a path to its end. `met` is what its ray meets first, if that is known already.
-    fn walk_from(&self, mut walk: Walk, mut met: Option<Point>, random: &mut Random) -> Sum {
+    fn walk_from(&self, walk: Walk, met: Option<Point>, random: &mut Random) -> Sum {
+        let mut waiting = Vec::new();
+        let mut sum = self.walk_one(walk, met, &mut waiting, random);
+        while let Some(walk) = waiting.pop() {
+            sum += self.walk_one(walk, None, &mut waiting, random);
+        }
+        sum
+    }
+
+    /// Follows one path, and leaves those that it is split into.
+    fn walk_one(&self, mut walk: Walk, mut met: Option<Point>, waiting: &mut Vec<Walk>, random: &mut Random) -> Sum {
         loop {
             let medium = self.medium(walk.inside);
             let sigma_t = medium.map_or(Rgb::ZERO, Medium::sigma_t);
@@ -239,6 +277,16 @@ impl Tracer {
                     walk.origin += free * walk.direction;
                     walk.on = None;
                     self.scatter(&mut walk, medium, random);
+                    if let Some(guide) = walk.inside.innermost().and_then(|thing| self.guides[thing].as_ref()) {
+                        let now = guide.promise(walk.origin, walk.weight.value);
+                        let (count, weight) = guide::paths(now, *walk.promise.get_or_insert(now), random);
+                        if count == 0 {
+                            return walk.sum;
+                        }
+                        walk.weight.value *= weight;
+                        waiting.extend((1..count).map(|_| Walk { sum: Sum::default(), ..walk }));
+                        continue;
+                    }
                 }
                 // Away; or out of a mesh that is not closed, where nobody can tell what light would come.
                 (None, _) => return walk.sum,
@@ -262,7 +310,8 @@ impl Tracer {
         let phase =
             |to: DVec3| Rgb::from_array(medium.parameter.to_array().map(|k| medium.phase.value(-from.dot(to), k)));
         self.join_lamps(walk, |lamp| self.is_joined(lamp), phase, random);
-        if let Some((ray, shadow)) = self.sky_sample(random) {
+        let refracts = walk.inside.only().is_some_and(|thing| self.world.things[thing].refracts());
+        if let Some((ray, shadow)) = self.sky_sample(random).filter(|_| !refracts) {
             self.join(walk, &ray, shadow, phase(ray.direction));
         }
         if let Some(thing) = walk.inside.only() {
@@ -298,10 +347,24 @@ impl Tracer {
                     walk.sum.scattered += walk.color * walk.weight.value * phase(to) * light;
                 });
             }
+            if walk.inside.only().is_some_and(|thing| self.is_behind_glass(lamp, thing)) {
+                continue;
+            }
             if let Some(ray) = lamp.sample(walk.origin, random) {
                 self.join(walk, &ray, lamp.shadow, phase(ray.direction));
             }
         }
+    }
+
+    /// Whether no straight line joins a lamp to a point inside a thing.
+    fn is_behind_glass(&self, lamp: &Lamp, thing: usize) -> bool {
+        let ball = self.world.balls[thing];
+        let nearest = match lamp.kind {
+            Kind::Directional { .. } => f64::INFINITY,
+            Kind::Point { position, .. } => position.distance(ball.center),
+            Kind::Rect { center, u, v, .. } => center.distance(ball.center) - u.length() - v.length(),
+        };
+        nearest > ball.radius && self.world.things[thing].refracts()
     }
 
     /// Adds a lamp's light at a vertex in a medium, straight through boundaries that do not refract.

@@ -145,6 +145,11 @@ impl Thing {
         Ball { center, radius: 1.0001 * radius }
     }
 
+    /// Whether light changes its direction where it enters.
+    pub fn refracts(&self) -> bool {
+        matches!(&self.matter, Matter::Translucent { surface, .. } if surface.ior != 1.0)
+    }
+
     /// The triangle's outward normal, and the interpolated one on the same side of it; the first for both where the second
     /// vanishes.
     pub fn normals(&self, triangle: usize, b: glam::DVec2) -> (DVec3, DVec3) {
