@@ -1,14 +1,14 @@
 //! The straight line from scene to image. Start reading at `line`.
 
-use crate::frame::{Frame, Part, Surface, Thing, View};
+use crate::frame::{self, Frame, Part, Surface, Thing, View};
 use crate::gpu::{Images, Shaders};
 use crate::image::{Display, Image};
 use crate::problem::{Problem, Problems};
-use crate::reference::{self, Develop};
+use crate::reference::film::{Film, Level};
+use crate::reference::{self, Develop, Judge};
 use crate::scene::{Scene, Substance, TechniqueText};
 use crate::store::{Plan, Slot};
-use crate::techniques::reference::Reference;
-use crate::techniques::{self, Technique};
+use crate::techniques::{self, Technique, Way};
 
 /// What somebody wants to see: a scene holds the physics, this holds the method.
 #[derive(Clone, Debug)]
@@ -35,32 +35,70 @@ impl Look {
     }
 }
 
-/// The plan for one picture: a plain list of steps, made without a device, in the order in which light would have it.
-pub fn plan(scene: &Scene, look: &Look, shaders: &Shaders) -> Result<(Plan, Slot<Image>), Problem> {
-    // The truth is traced, not drawn.
-    if let Some(truth) = Reference::of(&look.technique)? {
-        let mut plan = Plan::default();
-        let film = reference::plan(&mut plan, scene, &truth.settings(scene, &look.view), truth.max_spp(scene));
-        let picture = plan.add(Develop { film, part: look.view.part });
-        return Ok((plan, picture));
-    }
-    line(scene, look, shaders, |frame, plan, picture| Ok(frame.read_back(plan, picture)))
+/// A plan for a picture that stays on the device, as a display is sent it.
+pub struct Shown {
+    pub plan: Plan,
+    pub picture: Slot<Images>,
+    /// Of a picture that is traced, how far it is.
+    pub traced: Option<Traced>,
 }
 
-/// The plan for one picture that stays on the device, as a display is sent it.
+/// A traced picture gets better as long as one waits.
+pub struct Traced {
+    pub now: Exposure,
+    /// With twice as many paths; None: there are as many as there may be.
+    pub next: Option<Exposure>,
+    /// The relative standard error that is good enough.
+    pub max_error: f64,
+}
+
+/// So many paths per pixel.
+#[derive(Clone, Copy)]
+pub struct Exposure {
+    /// Linear.
+    pub image: Slot<Image>,
+    pub level: Slot<Level>,
+}
+
+/// The plan for one picture: a plain list of steps, made without a device, in the order in which light would have it.
+pub fn plan(scene: &Scene, look: &Look, shaders: &Shaders) -> Result<(Plan, Slot<Image>), Problem> {
+    let mut plan = Plan::default();
+    let picture = match picture(&mut plan, scene, look, shaders)? {
+        Picture::Drawn(picture) => frame::read_back(&mut plan, picture),
+        Picture::Traced(films, _) => {
+            let film = *films.last().expect("there is a first path");
+            plan.add(Develop { film, part: look.view.part })
+        }
+    };
+    Ok((plan, picture))
+}
+
+/// The plan for one picture in a window. Of what is traced `choose` is told all doublings of the paths per pixel, and gives
+/// the place of the one that is to be shown; the plan has the next one, too.
 pub fn plan_shown(
     scene: &Scene,
     look: &Look,
     display: Display,
     shaders: &Shaders,
-) -> Result<(Plan, Slot<Images>), Problem> {
-    if Reference::of(&look.technique)?.is_some() {
-        return Err(look
-            .technique
-            .problem("", "the window does not show the reference in this version")
-            .hint("`diaphane render` and `diaphane watch` do, and `diaphane reference` says how far it is"));
-    }
-    line(scene, look, shaders, |frame, plan, picture| frame.display(plan, picture, display))
+    choose: impl FnOnce(&Plan, &[Slot<Film>]) -> usize,
+) -> Result<Shown, Problem> {
+    let mut plan = Plan::default();
+    let (picture, traced) = match picture(&mut plan, scene, look, shaders)? {
+        Picture::Drawn(picture) => (picture, None),
+        Picture::Traced(films, max_error) => {
+            let part = look.view.part;
+            let chosen = choose(&plan, &films);
+            let mut expose = |film: Slot<Film>| Exposure {
+                image: plan.add(Develop { film, part }),
+                level: plan.add(Judge { film, part }),
+            };
+            let now = expose(films[chosen]);
+            let next = films.get(chosen + 1).copied().map(expose);
+            (frame::to_device(&mut plan, now.image), Some(Traced { now, next, max_error }))
+        }
+    };
+    let picture = frame::display(&mut plan, shaders, look.view.size, picture, display)?;
+    Ok(Shown { plan, picture, traced })
 }
 
 /// The plan for what stands at the first pixel: an object's place in the scene.
@@ -72,36 +110,46 @@ pub fn plan_seen(scene: &Scene, look: &Look, shaders: &Shaders) -> Result<(Plan,
     Ok((plan, seen))
 }
 
-/// The line itself, and what becomes of the picture at its end.
-fn line<T>(
-    scene: &Scene,
-    look: &Look,
-    shaders: &Shaders,
-    end: impl FnOnce(&Frame, &mut Plan, Slot<Images>) -> Result<Slot<T>, Problem>,
-) -> Result<(Plan, Slot<T>), Problem> {
-    let mut plan = Plan::default();
+/// A picture in linear light, and where it is.
+enum Picture {
+    /// On the device.
+    Drawn(Slot<Images>),
+    /// In films of ever more paths per pixel, until the relative standard error is so small.
+    Traced(Vec<Slot<Film>>, f64),
+}
 
+fn picture(plan: &mut Plan, scene: &Scene, look: &Look, shaders: &Shaders) -> Result<Picture, Problem> {
+    Ok(match techniques::way(&look.technique)? {
+        Way::Drawn(_) => Picture::Drawn(line(plan, scene, look, shaders)?),
+        Way::Traced(truth) => {
+            let settings = truth.settings(scene, &look.view);
+            let films = reference::doublings(plan, scene, &settings, truth.max_spp(scene));
+            Picture::Traced(films, truth.max_error(scene))
+        }
+    })
+}
+
+/// The line itself.
+fn line(plan: &mut Plan, scene: &Scene, look: &Look, shaders: &Shaders) -> Result<Slot<Images>, Problem> {
     // Who is in the picture, and which technique is whose.
-    let mut frame = Frame::new(scene, &look.view, shaders, &mut plan);
-    let groups = assign(&mut frame, look, &mut plan)?;
+    let mut frame = Frame::new(scene, &look.view, shaders, plan);
+    let groups = assign(&mut frame, look, plan)?;
 
     // What is seen.
-    let gbuffer = frame.gbuffer(&mut plan)?;
+    let gbuffer = frame.gbuffer(plan)?;
 
     // Light that went through: each technique for its own objects.
     let mut scattered = Vec::new();
     for Group { technique, items, .. } in groups {
         let surface = Surface { frame: &frame, items, gbuffer };
-        scattered.push(technique.plan(&mut plan, &surface)?);
+        scattered.push(technique.plan(plan, &surface)?);
     }
-    let scattered = frame.merge(&mut plan, &scattered)?;
+    let scattered = frame.merge(plan, &scattered)?;
 
     // Light that did not, and the sum.
-    let glossy = frame.gloss(&mut plan, gbuffer)?;
-    let composed = frame.compose(&mut plan, gbuffer, scattered, glossy)?;
-    let picture = frame.resolve(&mut plan, composed)?;
-    let end = end(&frame, &mut plan, picture)?;
-    Ok((plan, end))
+    let glossy = frame.gloss(plan, gbuffer)?;
+    let composed = frame.compose(plan, gbuffer, scattered, glossy)?;
+    frame.resolve(plan, composed)
 }
 
 /// Objects that share a technique with the same settings.
@@ -149,17 +197,19 @@ fn assign(frame: &mut Frame, look: &Look, plan: &mut Plan) -> Result<Vec<Group>,
 pub fn check(scene: &Scene, technique: &TechniqueText) -> Result<(), Problems> {
     let mut problems = Vec::new();
     let mut known: Vec<(&str, Box<dyn Technique>)> = Vec::new();
-    let named = scene.objects.iter().filter_map(|object| object.technique.as_ref());
-    let truth = Reference::of(technique)?;
-    let view = std::iter::once(technique).filter(|_| truth.is_none());
-    for text in view.chain(named) {
+    let mut drawn = true;
+    match techniques::way(technique) {
+        Ok(Way::Drawn(read)) => known.push((&technique.ron, read)),
+        Ok(Way::Traced(_)) => drawn = false,
+        Err(problem) => problems.push(problem),
+    }
+    for text in scene.objects.iter().filter_map(|object| object.technique.as_ref()) {
         match techniques::read(text) {
             Ok(read) => known.push((&text.ron, read)),
             Err(problem) => problems.push(problem),
         }
     }
-    let drawn = scene.objects.iter().filter(|object| truth.is_none() && object.material.medium.medium().is_some());
-    for object in drawn {
+    for object in scene.objects.iter().filter(|object| drawn && object.material.medium.medium().is_some()) {
         let text = object.technique.as_ref().unwrap_or(technique);
         let read = known.iter().find(|(ron, _)| *ron == text.ron);
         problems.extend(read.and_then(|(_, read)| read.refuses(&object.material)));

@@ -166,7 +166,7 @@ impl Session {
             let enough = match *goal {
                 Goal::Samples(count) => samples >= count,
                 Goal::Error { part, at_most, max_samples } => {
-                    samples >= max_samples || samples > 1 && film.relative_standard_error(part) <= at_most
+                    samples >= max_samples || film.level(part).reaches(at_most)
                 }
                 // The next doubling takes twice as long as the last: it is begun only if it can be finished.
                 Goal::Seconds(seconds) => (time + 2 * (time - before)).as_secs_f64() > seconds,

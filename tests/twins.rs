@@ -265,8 +265,9 @@ fn levels(curve: Tone, exposure_ev: f32) -> (Vec<[u8; 3]>, Vec<[u8; 3]>) {
     let (_, image) = studio.shoot(&scene, &look);
     let png = image.encode(Format::Png, display, &[]).unwrap_or_else(|problem| panic!("{problem}"));
     let png = image::load_from_memory(&png).expect("it is a PNG").to_rgb8().pixels().map(|pixel| pixel.0).collect();
-    let (plan, shown) = render::plan_shown(&scene, &look, display, &studio.session.shaders).expect("it can be planned");
-    let shown = studio.session.get(&plan, shown, &Nobody).unwrap_or_else(|problem| panic!("{problem}"));
+    let shown =
+        render::plan_shown(&scene, &look, display, &studio.session.shaders, |_, _| 0).expect("it can be planned");
+    let shown = studio.session.get(&shown.plan, shown.picture, &Nobody).unwrap_or_else(|problem| panic!("{problem}"));
     let gpu = studio.session.gpu().unwrap_or_else(|problem| panic!("{problem}"));
     let bytes = gpu.read_texture(&shown.0[0]).unwrap_or_else(|problem| panic!("{problem}"));
     (bytes.chunks_exact(4).map(|texel| [texel[0], texel[1], texel[2]]).collect(), png)

@@ -3,9 +3,7 @@ use super::progress::{Progress, seconds};
 use super::{Answer, counted, session};
 use crate::image::{Display, Format, Image, decode, exr_text, write_file};
 use crate::problem::{At, Cause, Problem, Problems};
-use crate::reference::film::Film;
 use crate::reference::{self, volume::Light};
-use crate::scene::Part;
 use crate::session::{Goal, Options, whole};
 use crate::store::{Key, Origin};
 use serde_json::json;
@@ -174,7 +172,8 @@ impl Trace {
             (None, None) => Goal::Error { part, at_most: self.max_error.unwrap_or(own.max_error), max_samples },
         };
         let progress = Progress::new();
-        let film = session.trace(&scene, &settings, &goal, &progress, |film| progress.tell(&level(film, part)))?;
+        let film =
+            session.trace(&scene, &settings, &goal, &progress, |film| progress.tell(&film.level(part).to_string()))?;
         let picture = film.picture(part);
         whole(&picture)?;
         let scene_key = Key::of(&scene).to_string();
@@ -224,19 +223,11 @@ impl Trace {
             output.display(),
             film.width,
             film.height,
-            level(&film, part),
+            film.level(part),
             seconds(time),
             counted(from_disk, "step"),
         );
         Ok(Answer::new(line, facts).warn(warnings).warn(told).warn(goal_missed))
-    }
-}
-
-fn level(film: &Film, part: Part) -> String {
-    let samples = counted(film.samples as usize, "sample");
-    match film.relative_standard_error(part) {
-        error if error.is_finite() => format!("{samples} per pixel, relative standard error {error:.4}"),
-        _ => format!("{samples} per pixel"),
     }
 }
 

@@ -1,7 +1,7 @@
 //! What follows the techniques: gloss, what passes through, the sum, and the picture.
 
 use super::{Frame, Item, PACKED, POSITION, Part, Thing, tables};
-use crate::gpu::{Bind, Blend, Depth, Format, Fullscreen, Gpu, Images, Layer, Raster};
+use crate::gpu::{Bind, Blend, Depth, Format, Fullscreen, Gpu, Images, Layer, Raster, Shaders};
 use crate::image::{Display, Image, Tone};
 use crate::problem::Problem;
 use crate::scene::Substance;
@@ -128,11 +128,6 @@ impl Frame<'_> {
         })
     }
 
-    /// The picture, back from the device.
-    pub(crate) fn read_back(&self, plan: &mut Plan, resolved: Slot<Images>) -> Slot<Image> {
-        plan.add(ReadBack { picture: resolved })
-    }
-
     /// Which object is seen at the first pixel.
     pub(crate) fn seen(&self, plan: &mut Plan, gbuffer: Slot<Images>) -> Slot<Option<usize>> {
         let object = |item: &Item| match item.thing {
@@ -141,31 +136,37 @@ impl Frame<'_> {
         };
         plan.add(Seen { gbuffer, objects: self.items.iter().map(object).collect() })
     }
+}
 
-    /// The picture as a display is sent it, 8 bits a channel: the levels that [`Image::encode`] gives a PNG.
-    pub(crate) fn display(
-        &self,
-        plan: &mut Plan,
-        resolved: Slot<Images>,
-        display: Display,
-    ) -> Result<Slot<Images>, Problem> {
-        let tone = match display.tone {
-            Tone::Clamp => tables::CLAMP,
-            Tone::Srgb => tables::SRGB,
-            Tone::Filmic => tables::FILMIC,
-        };
-        Ok(plan.add(Fullscreen {
-            name: "frame.display",
-            about: format!("exposed by {:+} stops, through the curve {:?}", display.exposure_ev, display.tone),
-            shader: self.shaders.load("frame/display.wgsl", &[])?,
-            size: self.view.size,
-            targets: vec![Format::Rgba8Unorm],
-            binds: vec![
-                ("display", Bind::uniform(&tables::Display { gain: display.exposure_ev.exp2(), tone })),
-                ("picture", Bind::Texture(resolved, 0)),
-            ],
-        }))
-    }
+/// The picture as a display is sent it, 8 bits a channel: the levels that [`Image::encode`] gives a PNG.
+pub(crate) fn display(
+    plan: &mut Plan,
+    shaders: &Shaders,
+    size: (u32, u32),
+    picture: Slot<Images>,
+    display: Display,
+) -> Result<Slot<Images>, Problem> {
+    let tone = match display.tone {
+        Tone::Clamp => tables::CLAMP,
+        Tone::Srgb => tables::SRGB,
+        Tone::Filmic => tables::FILMIC,
+    };
+    Ok(plan.add(Fullscreen {
+        name: "frame.display",
+        about: format!("exposed by {:+} stops, through the curve {:?}", display.exposure_ev, display.tone),
+        shader: shaders.load("frame/display.wgsl", &[])?,
+        size,
+        targets: vec![Format::Rgba8Unorm],
+        binds: vec![
+            ("display", Bind::uniform(&tables::Display { gain: display.exposure_ev.exp2(), tone })),
+            ("picture", Bind::Texture(picture, 0)),
+        ],
+    }))
+}
+
+/// The picture, back from the device.
+pub(crate) fn read_back(plan: &mut Plan, picture: Slot<Images>) -> Slot<Image> {
+    plan.add(ReadBack { picture })
 }
 
 /// Which object stands at the first pixel of the G-buffer: its place in the scene.

@@ -21,6 +21,7 @@ mod tables;
 mod upload;
 
 pub use crate::scene::Part;
+pub(crate) use compose::{display, read_back};
 pub use surface::{Member, Surface};
 
 use crate::geometry::mesh::Mesh;
@@ -32,6 +33,7 @@ use crate::store::{Plan, Slot};
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec3};
 use std::cell::OnceCell;
 use upload::Stream;
+pub(crate) use upload::picture as to_device;
 
 /// How to look at a scene, as far as the frame is concerned.
 #[derive(Clone, Debug, PartialEq)]

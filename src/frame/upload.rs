@@ -1,7 +1,8 @@
-//! Meshes and lists on the device.
+//! Meshes, lists and pictures on the device.
 
 use crate::geometry::mesh::Mesh;
-use crate::gpu::{Buffer, Gpu};
+use crate::gpu::{Buffer, Format, Gpu, Images, Shape};
+use crate::image::Image;
 use crate::problem::Problem;
 use crate::store::{Plan, Run, Slot, Step};
 use serde::Serialize;
@@ -74,4 +75,30 @@ where
     T: bytemuck::Pod + Send + Sync,
 {
     plan.add(UploadList { list, about })
+}
+
+/// A picture that was made elsewhere, on the device as if it had been drawn there.
+#[derive(Serialize)]
+struct UploadPicture {
+    picture: Slot<Image>,
+}
+
+impl Step for UploadPicture {
+    type Output = Images;
+    fn name(&self) -> &'static str {
+        "gpu.upload"
+    }
+    fn about(&self) -> String {
+        "the picture to the device".into()
+    }
+    fn run(&self, run: &Run) -> Result<Images, Problem> {
+        let picture = run.get(self.picture);
+        let texels: Vec<[f32; 4]> = picture.pixels.iter().map(|[r, g, b]| [*r, *g, *b, 1.0]).collect();
+        let shape = Shape::flat((picture.width, picture.height), Format::Rgba32Float);
+        Ok(Images(vec![run.host::<Gpu>().texture_with(shape, bytemuck::cast_slice(&texels))]))
+    }
+}
+
+pub(crate) fn picture(plan: &mut Plan, picture: Slot<Image>) -> Slot<Images> {
+    plan.add(UploadPicture { picture })
 }

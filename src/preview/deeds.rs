@@ -5,7 +5,6 @@ use super::channel::Order;
 use super::panel::Wish;
 use super::screen::{Painting, Screen};
 use super::stage::Viewing;
-use super::telling::list;
 use super::window::Preview;
 use crate::frame::ball;
 use crate::image::tone::linear_from_srgb;
@@ -24,7 +23,7 @@ impl Preview {
     pub fn grant(&mut self, wish: Wish, screen: &mut Screen) {
         let height = self.place.1 as f64 / screen.window.scale_factor();
         let now = Instant::now();
-        if matches!(wish, Wish::Orbit(_) | Wish::Pan(_) | Wish::Zoom(_) | Wish::Display(_) | Wish::Time(_)) {
+        if matches!(wish, Wish::Orbit(_) | Wish::Pan(_) | Wish::Zoom(_) | Wish::Time(_)) {
             self.pace.moved(now);
         }
         let camera = &mut self.viewing.camera;
@@ -48,7 +47,7 @@ impl Preview {
             Wish::Time(time_s) => {
                 if let Some(mut subject) = self.stage.subject().cloned() {
                     subject.look.view.time_s = time_s;
-                    self.stage.want(subject);
+                    self.want(subject);
                 }
             }
             Wish::Play(play) => {
@@ -97,15 +96,7 @@ impl Preview {
                 self.capture = Some(file);
                 return self.redraw_soon();
             }
-            Order::Status => {
-                let facts = json!({
-                    "frames": self.frames,
-                    "problems": list(&self.problems()),
-                    "size": self.screen.as_ref().and_then(Screen::size),
-                    "baking": self.stage.progress().map(|progress| progress.about),
-                });
-                return self.channel.say("status", facts);
-            }
+            Order::Status => return self.tell_status(),
             Order::LoseDevice => {
                 self.screen.iter().for_each(|screen| screen.gpu.device.destroy());
                 return self.redraw_soon();
@@ -119,8 +110,8 @@ impl Preview {
     fn with_screen(&mut self, deed: impl FnOnce(&mut Preview, &mut Screen)) {
         if let Some(mut screen) = self.screen.take() {
             deed(self, &mut screen);
-            screen.window.request_redraw();
             self.screen = Some(screen);
+            self.redraw_soon();
         }
     }
 
@@ -147,7 +138,7 @@ impl Preview {
             Ok(text) => {
                 subject.look.technique = text;
                 self.refused = Problems::default();
-                self.stage.want(subject);
+                self.want(subject);
             }
             Err(problems) => self.refused = problems,
         }

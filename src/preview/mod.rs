@@ -3,6 +3,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `window` | the event loop: what happens when, and the only place that knows winit |
+//! | `redraw` | one frame of it |
 //! | `screen` | the surface of the window, and what is painted on it |
 //! | `stage` | what is looked at, and how its picture comes to be |
 //! | `worker` | the threads that read files and make what needs no device |
@@ -14,7 +15,8 @@
 //!
 //! There is no state that says what has to be done again: every frame that is drawn is planned anew, and the store knows
 //! what is there. An idle window draws nothing. Passes run on the window's own thread, in plan order; bakes on another
-//! one, and until they are there the last subject that was complete is drawn from wherever the camera is.
+//! one, and until they are there the last subject that was complete is drawn from wherever the camera is. What is traced is
+//! shown with as many paths as there are, while the next doubling of them is made like a bake.
 //!
 //! Re-runs when: a hand, a file or the worker moves.
 
@@ -24,6 +26,7 @@ mod deeds;
 mod overlay;
 mod pace;
 mod panel;
+mod redraw;
 mod screen;
 mod stage;
 mod telling;

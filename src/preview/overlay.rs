@@ -3,6 +3,7 @@
 use super::panel::Wish;
 use super::worker::Progress;
 use crate::problem::Problems;
+use crate::reference::film::Level;
 use egui::{
     Align2, Area, Color32, CornerRadius, CursorIcon, Frame, Key, Layout, Margin, PointerButton, ProgressBar, Rect,
     Response, RichText, ScrollArea, Sense, TextureId, Ui, UiBuilder, Vec2, pos2,
@@ -17,6 +18,8 @@ pub struct Said<'a> {
     pub problems: &'a Problems,
     /// What the picture waits for, if it is older than what is wanted.
     pub waits: Option<Waits>,
+    /// How far the picture is, if a better one is on its way.
+    pub refines: Option<Level>,
     pub note: Option<&'a str>,
 }
 
@@ -97,7 +100,7 @@ fn top(ui: &mut Ui, rect: Rect, said: &Said) {
                 Waits::ForFiles => drop(ui.label("reading the files")),
                 Waits::ForStep(progress, older) => {
                     ui.label(match older {
-                        true => "older than the files; the new picture waits for",
+                        true => "this is an older picture; the new one waits for",
                         false => "the picture waits for",
                     });
                     let (about, share) = progress.as_ref().map_or(("its turn", 0.0), |p| (&p.about, p.share));
@@ -107,6 +110,9 @@ fn top(ui: &mut Ui, rect: Rect, said: &Said) {
                 }
             }
         });
+    }
+    if let Some(level) = &said.refines {
+        plate(dark).show(&mut ui, |ui| ui.label(RichText::new(level.to_string()).color(Color32::WHITE)));
     }
     if let Some(note) = said.note {
         plate(dark).show(&mut ui, |ui| ui.label(RichText::new(note).color(Color32::WHITE)));

@@ -25,6 +25,11 @@ impl Pace {
         self.moved = Some(now);
     }
 
+    /// Pictures are made in another way from now on. Until the first one is there, the slow way counts as the slowest.
+    pub fn start_anew(&mut self, slow: bool) {
+        self.full = if slow { f64::INFINITY } else { 0.0 };
+    }
+
     /// When the picture is to be drawn in full, if it is not by now.
     pub fn rest(&self, now: Instant) -> Option<Instant> {
         self.moved.map(|moved| moved + QUIET).filter(|rest| *rest > now)
@@ -104,6 +109,10 @@ mod tests {
         assert_eq!(pace.share(now), 1.0);
         pace.took(Duration::from_secs(9), 1.0);
         assert_eq!(pace.share(now), 0.25);
+        pace.start_anew(false);
+        assert_eq!(pace.share(now), 1.0);
+        pace.start_anew(true);
+        assert_eq!((pace.share(now), pace.share(now + QUIET)), (0.25, 1.0));
     }
 
     #[test]

@@ -165,7 +165,13 @@ impl Panel {
         let Some(drawn) = facts.drawn else { return };
         let (width, height) = (drawn.picture.0[0].shape.width, drawn.picture.0[0].shape.height);
         let ms = 1e3 * drawn.time.as_secs_f64();
-        ui.label(format!("{width} x {height} pixels in {ms:.1} ms"));
+        match drawn.level {
+            Some(level) => {
+                ui.label(format!("{width} x {height} pixels"));
+                ui.label(format!("{level}; {}", if drawn.refines { "it goes on" } else { "as good as it was to be" }));
+            }
+            None => drop(ui.label(format!("{width} x {height} pixels in {ms:.1} ms"))),
+        }
         let steps = drawn.steps;
         ui.label(format!("{} steps run, {} reused, {} not needed", steps.ran, steps.reused, steps.unneeded));
         CollapsingHeader::new(format!("{} left out", drawn.skipped.len())).id_salt("skipped").show(ui, |ui| {
@@ -220,3 +226,74 @@ F: look at what is chosen, or at all
 R: as in the file
 space: play      P: write a picture
 H: hide this panel";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::Look;
+    use crate::scene::Reader;
+    use std::sync::Arc;
+
+    const SCENE: &str = r#"Scene(
+        version: 1,
+        mm_per_unit: 10,
+        camera: (eye: (0, 0, 6)),
+        objects: [(name: "tower", mesh: Box(size: (1, 2, 1)), material: "stone.ron",
+                   deform: [Twist(deg_per_unit: 40, speed_hz: SPEED)])],
+    )"#;
+
+    /// What is wanted when all of the panel's places are clicked, one after another.
+    fn clicked(speed: &str) -> Vec<Wish> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.ron");
+        std::fs::write(&path, SCENE.replace("SPEED", speed)).unwrap();
+        std::fs::write(folder.path().join("stone.ron"), "Material(version: 1, medium: Opaque(albedo: 0.5))").unwrap();
+        let (scene, _) = Reader::new(Arc::default()).scene(&path, &[]).unwrap();
+        let subject = Subject { look: Look::of(&scene), scene: Arc::new(scene) };
+        let home = subject.look.view.camera;
+        let viewing = Viewing { camera: home, size: (1, 1), display: Display::default(), moving: false };
+        let facts = Facts {
+            subject: &subject,
+            home,
+            viewing: &viewing,
+            drawn: None,
+            times: &Times::default(),
+            warnings: &[],
+            adapter: String::new(),
+            playing: true,
+        };
+        let (context, mut panel, mut all) = (egui::Context::default(), Panel::default(), Vec::new());
+        for y in (0..600).step_by(4) {
+            let pos = egui::pos2(60.0, y as f32);
+            let button = |pressed| {
+                let (button, modifiers) = (egui::PointerButton::Primary, egui::Modifiers::NONE);
+                egui::Event::PointerButton { pos, button, pressed, modifiers }
+            };
+            for event in [egui::Event::PointerMoved(pos), button(true), button(false)] {
+                let size = egui::vec2(WIDTH, 600.0);
+                let screen_rect = Some(egui::Rect::from_min_size(egui::Pos2::ZERO, size));
+                let input = egui::RawInput { screen_rect, events: vec![event], ..Default::default() };
+                let mut wishes = Vec::new();
+                let mut output = context.run_ui(input, |ui| {
+                    wishes.clear();
+                    panel.ui(ui, &facts, &mut wishes);
+                });
+                output.textures_delta.clear();
+                all.extend(wishes);
+            }
+        }
+        all
+    }
+
+    #[test]
+    fn the_slider_of_time_sets_it_and_stops_play_and_only_what_moves_has_one() {
+        let wishes = clicked("0.5");
+        let set = wishes.windows(2).any(|pair| match pair {
+            [Wish::Play(false), Wish::Time(time_s)] => *time_s > 0.0,
+            _ => false,
+        });
+        assert!(set && wishes.contains(&Wish::Screenshot), "{wishes:?}");
+        let still = clicked("0");
+        assert!(!still.iter().any(|wish| matches!(wish, Wish::Time(_) | Wish::Play(_))), "{still:?}");
+    }
+}

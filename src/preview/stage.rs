@@ -8,7 +8,9 @@ use super::worker::{News, Tell, Worker};
 use crate::gpu::{Gpu, Images, Shaders};
 use crate::image::{Display, Image};
 use crate::problem::{Problem, Problems};
-use crate::render::{self, Look};
+use crate::reference::TRACE;
+use crate::reference::film::Level;
+use crate::render::{self, Exposure, Look, Shown, Traced};
 use crate::scene::Camera;
 use crate::session::Options;
 use crate::store::{Disk, Finished, Key, Origin, Plan, Skipped, Slot, Store, Watch};
@@ -33,6 +35,8 @@ pub struct Stage {
     making: Option<Problem>,
     /// What the worker could not make.
     failed: Option<(Vec<Key>, Problem)>,
+    /// The first paths that were asked for while things moved.
+    on_its_way: Option<(Subject, Viewing)>,
 }
 
 /// Where from, how large and how bright.
@@ -41,6 +45,8 @@ pub struct Viewing {
     pub camera: Camera,
     pub size: (u32, u32),
     pub display: Display,
+    /// Whether it will be another one soon.
+    pub moving: bool,
 }
 
 /// A picture, and how it came to be.
@@ -53,6 +59,24 @@ pub struct Drawn {
     pub finished: Vec<Finished>,
     pub skipped: Vec<Skipped>,
     pub time: Duration,
+    /// How far it is, if it is traced.
+    pub level: Option<Level>,
+    /// Whether a better one is on its way.
+    pub refines: bool,
+}
+
+impl Drawn {
+    /// What such a picture costs: of a traced one, a path for each pixel. None: nobody knows, since it was there.
+    pub fn cost(&self, made: &[Finished]) -> Option<Duration> {
+        let ran = |step: &&Finished| step.origin == Origin::Ran;
+        match self.level {
+            None => self.finished.iter().find(ran).map(|_| self.time),
+            Some(Level { samples: 1, .. }) => {
+                made.iter().filter(ran).find(|step| step.name == TRACE).map(|step| step.time)
+            }
+            Some(_) => None,
+        }
+    }
 }
 
 /// How many steps of a plan were made for a picture, were there, and were not even looked at.
@@ -63,10 +87,8 @@ pub struct Steps {
     pub unneeded: usize,
 }
 
-enum Tried {
-    Drawn(Drawn),
-    Waits,
-}
+/// A picture, and the steps that the worker can make a better one with; None: it waits for the worker.
+type Tried = Option<(Drawn, Option<(Plan, Vec<u32>)>)>;
 
 impl Stage {
     pub fn new(options: Options, shaders: Shaders, tell: Tell) -> Stage {
@@ -81,6 +103,7 @@ impl Stage {
             files: Problems::default(),
             making: None,
             failed: None,
+            on_its_way: None,
         }
     }
 
@@ -132,53 +155,99 @@ impl Stage {
     pub fn draw(&mut self, gpu: &Gpu, viewing: &Viewing) -> Option<Drawn> {
         let wanted = self.wanted.clone()?;
         self.making = None;
-        match self.try_draw(&wanted, gpu, viewing, true) {
-            Ok(Tried::Drawn(drawn)) => {
-                self.worker.rest();
+        // While things move, paths that are on their way are finished first, or none ever would be.
+        let on_its_way = self.on_its_way.take().filter(|(subject, _)| viewing.moving && subject.same(&wanted));
+        let from = on_its_way.map_or(*viewing, |(_, earlier)| earlier);
+        match self.try_draw(&wanted, gpu, &from, true) {
+            Ok(Some((mut drawn, better))) => {
+                drawn.current = from == *viewing;
+                match better.filter(|_| drawn.current).map(|(plan, places)| self.ask(plan, places)) {
+                    Some(Ok(())) => drawn.refines = true,
+                    Some(Err(problem)) => self.making = Some(problem),
+                    None => self.worker.rest(),
+                }
                 self.drawn = Some(wanted);
                 return Some(drawn);
             }
-            Ok(Tried::Waits) => {}
+            Ok(None) => {}
             Err(problem) => self.making = Some(problem),
         }
         // A shader that is wrong is wrong for every subject; its problem is told once.
         let last = self.drawn.clone().filter(|drawn| !drawn.same(&wanted))?;
         match self.try_draw(&last, gpu, viewing, false) {
-            Ok(Tried::Drawn(drawn)) => Some(Drawn { current: false, ..drawn }),
+            Ok(Some((drawn, _))) => Some(drawn),
             _ => None,
         }
     }
 
     fn try_draw(&mut self, subject: &Subject, gpu: &Gpu, viewing: &Viewing, is_wanted: bool) -> Result<Tried, Problem> {
         let started = Instant::now();
-        let look = look(subject, viewing, gpu);
-        let (plan, slot) = render::plan_shown(&subject.scene, &look, viewing.display, &self.shaders)?;
+        let Shown { plan, picture, traced } = self.plan(subject, gpu, viewing)?;
         // A shader that is wrong was replaced by its last good self.
         self.making = self.making.take().or(self.shaders.trouble());
-        let missing = self.store.missing_without_host(&plan, slot);
+        let missing = match &traced {
+            Some(traced) => self.missing(&plan, traced.now),
+            None => self.store.missing_without_host(&plan, picture),
+        };
         if !missing.is_empty() {
-            if !is_wanted {
-                return Ok(Tried::Waits);
+            if is_wanted {
+                self.ask(plan, missing)?;
+                self.on_its_way = (traced.is_some() && viewing.moving).then(|| (subject.clone(), *viewing));
             }
-            let keys: Vec<Key> = missing.iter().map(|place| plan.steps()[*place as usize].key).collect();
-            if let Some((failed, problem)) = &self.failed
-                && *failed == keys
-            {
-                return Err(problem.clone());
-            }
-            self.worker.ask(&Arc::new(plan), missing);
-            return Ok(Tried::Waits);
+            return Ok(None);
         }
-        let steps = self.steps(&plan, slot);
+        let steps = self.steps(&plan, picture);
         let log = Log::default();
-        let picture = self.store.get_with(&plan, slot, Some(gpu), &log)?;
+        let images = self.store.get_with(&plan, picture, Some(gpu), &log)?;
         // Only now is the time that it took known, and whether the device is still there.
         gpu.wait()?;
         gpu.check("the picture")?;
-        let finished = log.0.into_inner().expect("nobody panics while noting a step");
-        let skipped = plan.skipped().to_vec();
         let time = started.elapsed();
-        Ok(Tried::Drawn(Drawn { picture, key: slot.key(), current: is_wanted, steps, finished, skipped, time }))
+        let mut drawn = Drawn {
+            picture: images,
+            key: picture.key(),
+            current: false,
+            steps,
+            finished: log.0.into_inner().expect("nobody panics while noting a step"),
+            skipped: plan.skipped().to_vec(),
+            time,
+            level: None,
+            refines: false,
+        };
+        let Some(Traced { now, next, max_error }) = traced else { return Ok(Some((drawn, None))) };
+        let level = *self.store.get(&plan, now.level)?;
+        drawn.level = Some(level);
+        let better = next.filter(|_| !level.reaches(max_error)).map(|next| self.missing(&plan, next));
+        Ok(Some((drawn, better.map(|places| (plan, places)))))
+    }
+
+    /// What is traced is shown with as many paths as there are by now.
+    fn plan(&self, subject: &Subject, gpu: &Gpu, viewing: &Viewing) -> Result<Shown, Problem> {
+        let look = look(subject, viewing, gpu);
+        render::plan_shown(&subject.scene, &look, viewing.display, &self.shaders, |plan, films| {
+            films.iter().rposition(|film| self.store.has(plan, *film)).unwrap_or(0)
+        })
+    }
+
+    /// What is the worker's to make of a traced picture: places in the plan.
+    fn missing(&self, plan: &Plan, traced: Exposure) -> Vec<u32> {
+        let mut places = self.store.missing_without_host(plan, traced.image);
+        places.extend(self.store.missing_without_host(plan, traced.level));
+        places.sort_unstable();
+        places.dedup();
+        places
+    }
+
+    /// Asks the worker for steps, if it did not fail to make them.
+    fn ask(&self, plan: Plan, places: Vec<u32>) -> Result<(), Problem> {
+        let keys: Vec<Key> = places.iter().map(|place| plan.steps()[*place as usize].key).collect();
+        match &self.failed {
+            Some((failed, problem)) if *failed == keys => Err(problem.clone()),
+            _ => {
+                self.worker.ask(&Arc::new(plan), places);
+                Ok(())
+            }
+        }
     }
 
     fn steps(&self, plan: &Plan, slot: Slot<Images>) -> Steps {
@@ -193,10 +262,15 @@ impl Stage {
         steps
     }
 
-    /// The linear picture of what was drawn last, for a file.
+    /// The linear picture of what was drawn last, for a file. None: there is none yet.
     pub fn image(&mut self, gpu: &Gpu, viewing: &Viewing) -> Result<Option<(Arc<Image>, Subject)>, Problem> {
         let Some(subject) = self.drawn.clone() else { return Ok(None) };
-        let (plan, slot) = render::plan(&subject.scene, &look(&subject, viewing, gpu), &self.shaders)?;
+        let Shown { plan, traced, .. } = self.plan(&subject, gpu, viewing)?;
+        let (plan, slot) = match traced {
+            Some(traced) if self.missing(&plan, traced.now).is_empty() => (plan, traced.now.image),
+            Some(_) => return Ok(None),
+            None => render::plan(&subject.scene, &look(&subject, viewing, gpu), &self.shaders)?,
+        };
         Ok(Some((self.store.get_with(&plan, slot, Some(gpu), &Log::default())?, subject)))
     }
 
@@ -212,7 +286,8 @@ impl Stage {
     /// Asks for every shader of the picture, so that whoever follows the files knows them even when nothing is drawn.
     pub fn name_files(&self) {
         if let Some(subject) = self.wanted.as_ref().or(self.drawn.as_ref()) {
-            render::plan(&subject.scene, &subject.look, &self.shaders).ok(); // a problem shows when it is drawn
+            // A problem shows when it is drawn.
+            render::plan_shown(&subject.scene, &subject.look, Display::default(), &self.shaders, |_, _| 0).ok();
         }
     }
 }

@@ -4,15 +4,14 @@ use super::screen::Screen;
 use super::stage::Drawn;
 use super::window::Preview;
 use crate::problem::{Problem, Problems};
-use crate::store::{Key, Origin};
+use crate::store::{Finished, Key, Origin};
 use serde_json::{Value, json};
 
 impl Preview {
-    pub fn tell_picture(&mut self, screen: &Screen, drawn: &Drawn, whole: bool) {
+    pub fn tell_picture(&mut self, screen: &Screen, drawn: &Drawn, made: &[Finished], whole: bool) {
         self.told_waiting &= !drawn.current;
         let texture = &drawn.picture.0[0];
         let Ok(levels) = screen.gpu.read_texture(texture) else { return }; // a lost device is noticed by the next frame
-        let made = std::mem::take(&mut self.made);
         let of = |origin: Origin| made.iter().filter(|step| step.origin == origin).count();
         self.channel.say(
             "drawn",
@@ -23,6 +22,11 @@ impl Preview {
                 "current": drawn.current,
                 "whole": whole,
                 "steps": { "run": drawn.steps.ran, "reused": drawn.steps.reused, "unneeded": drawn.steps.unneeded },
+                "traced": drawn.level.map(|level| json!({
+                    "samples": level.samples,
+                    "relative_standard_error": level.error.is_finite().then_some(level.error),
+                    "refines": drawn.refines,
+                })),
                 "bakes": { "run": of(Origin::Ran), "disk": of(Origin::Disk) },
                 "ms": 1e3 * drawn.time.as_secs_f64(),
             }),
@@ -41,6 +45,28 @@ impl Preview {
         Problems(self.stage.problems().0.into_iter().chain(self.refused.0.iter().cloned()).collect())
     }
 
+    /// How things stand.
+    pub fn tell_status(&self) {
+        let subject = self.stage.subject();
+        let chosen = self.panel.chosen.zip(subject).map(|(place, subject)| &subject.scene.objects[place].name);
+        self.channel.say(
+            "status",
+            json!({
+                "frames": self.frames,
+                "problems": list(&self.problems()),
+                "size": self.screen.as_ref().and_then(Screen::size),
+                "baking": self.stage.progress().map(|progress| progress.about),
+                "eye": self.viewing.camera.eye.to_array(),
+                "target": self.viewing.camera.target.to_array(),
+                "technique": subject.map(|subject| &subject.look.technique.ron),
+                "time_s": subject.map(|subject| subject.look.view.time_s),
+                "playing": self.playing.is_some(),
+                "chosen": chosen,
+                "panel": self.panel.shown,
+            }),
+        );
+    }
+
     pub fn tell_problems(&mut self) {
         let problems = self.problems();
         if problems == self.told {
@@ -55,6 +81,6 @@ impl Preview {
     }
 }
 
-pub(super) fn list(problems: &Problems) -> Value {
+fn list(problems: &Problems) -> Value {
     problems.0.iter().map(Problem::json).collect()
 }

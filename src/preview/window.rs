@@ -1,10 +1,9 @@
 //! The event loop: what happens when. The only place that knows winit.
 
 use super::channel::{Channel, Order};
-use super::overlay::{self, Said, Waits};
 use super::pace::{Pace, Times};
-use super::panel::{self, Facts, Panel, Wish};
-use super::screen::{Painting, Screen};
+use super::panel::Panel;
+use super::screen::Screen;
 use super::stage::{Drawn, Stage, Viewing};
 use super::worker::{News, Reading, Tell};
 use super::{Asked, Subject};
@@ -13,19 +12,17 @@ use crate::image::Display;
 use crate::problem::{Cause, Problem, Problems};
 use crate::render;
 use crate::scene::{Camera, Reader, TechniqueText};
-use crate::store::{Files, Finished, Follow, Key, Origin};
+use crate::store::{Files, Finished, Follow};
+use crate::techniques::reference::Reference;
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use winit::application::ApplicationHandler;
 use winit::dpi::{LogicalSize, PhysicalSize, Size};
 use winit::event::{StartCause, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
-use winit::window::WindowId;
-
-/// How long a note stays.
-const NOTE: Duration = Duration::from_secs(5);
+use winit::window::{Window, WindowId};
 
 /// What other threads bring.
 enum Brought {
@@ -66,23 +63,25 @@ pub(super) struct Preview {
     pub channel: Channel,
     pub stage: Stage,
     reading: Reading,
-    reads: bool,
+    pub reads: bool,
     files: Arc<Files>,
     follow: Follow,
-    egui: egui::Context,
-    input: Option<egui_winit::State>,
+    pub egui: egui::Context,
+    pub input: Option<egui_winit::State>,
+    /// What is drawn on; who draws has taken it.
     pub screen: Option<Screen>,
+    window: Option<Arc<Window>>,
     pub panel: Panel,
     pub base: Option<Base>,
     pub viewing: Viewing,
     /// The picture's place, pixels.
     pub place: (u32, u32),
     pub pace: Pace,
-    times: Times,
-    drawn: Option<Drawn>,
+    pub times: Times,
+    pub drawn: Option<Drawn>,
     /// What the worker made since the last picture.
     pub made: Vec<Finished>,
-    warnings: Vec<Problem>,
+    pub warnings: Vec<Problem>,
     /// A choice that is not possible with this scene.
     pub refused: Problems,
     /// The problems that were told last.
@@ -91,12 +90,11 @@ pub(super) struct Preview {
     /// When it began, and the scene's time then.
     pub playing: Option<(Instant, f64)>,
     pub capture: Option<PathBuf>,
-    told_picture: Option<Key>,
     pub told_waiting: bool,
     pub frames: u64,
     /// Whether the device was opened anew and has drawn nothing yet.
-    rebuilt: bool,
-    next: Option<Instant>,
+    pub rebuilt: bool,
+    pub next: Option<Instant>,
     end: Option<Problem>,
 }
 
@@ -158,9 +156,10 @@ impl Preview {
             egui: egui::Context::default(),
             input: None,
             screen: None,
+            window: None,
             panel: Panel::default(),
             base: None,
-            viewing: Viewing { camera: Camera::default(), size: (1, 1), display: Display::default() },
+            viewing: Viewing { camera: Camera::default(), size: (1, 1), display: Display::default(), moving: false },
             place: (1, 1),
             pace: Pace::default(),
             times: Times::default(),
@@ -172,7 +171,6 @@ impl Preview {
             note: None,
             playing: None,
             capture: None,
-            told_picture: None,
             told_waiting: false,
             frames: 0,
             rebuilt: false,
@@ -182,14 +180,23 @@ impl Preview {
     }
 
     pub fn redraw_soon(&self) {
-        if let Some(screen) = &self.screen {
-            screen.window.request_redraw();
+        if let Some(window) = &self.window {
+            window.request_redraw();
         }
     }
 
     pub fn read_files(&mut self) {
         self.reads = true;
         self.reading.ask();
+    }
+
+    /// From now on this is to be seen.
+    pub fn want(&mut self, subject: Subject) {
+        let technique = &subject.look.technique;
+        if self.stage.subject().is_none_or(|old| old.look.technique != *technique) {
+            self.pace.start_anew(technique.name == Reference::NAME);
+        }
+        self.stage.want(subject);
     }
 
     /// What the files hold by now.
@@ -225,7 +232,7 @@ impl Preview {
                     self.refused = problems;
                     subject.look.technique = base.technique;
                 }
-                self.stage.want(subject);
+                self.want(subject);
             }
         }
         self.stage.name_files();
@@ -236,6 +243,8 @@ impl Preview {
     fn hear(&mut self, news: News) {
         match news {
             News::Read(read) => self.read(read),
+            // Who looks at a picture is not disturbed while a better one is made.
+            News::Progress if self.drawn.as_ref().is_some_and(|drawn| drawn.current) => {}
             news => {
                 self.made.extend(self.stage.hear(news));
                 self.redraw_soon();
@@ -244,9 +253,8 @@ impl Preview {
     }
 
     /// Everything that lives on the device, once more: it was lost. The second time in a row it is given up.
-    fn rebuild(&mut self, event_loop: &ActiveEventLoop, why: Problem) {
+    pub fn rebuild(&mut self, event_loop: &ActiveEventLoop, why: Problem) {
         let screen = self.screen.take();
-        let window = screen.as_ref().map(|screen| screen.window.clone());
         // What the old device holds has to go before the window gets another surface.
         self.drawn = None;
         self.stage.forget_device();
@@ -255,7 +263,7 @@ impl Preview {
             return self.give_up(event_loop, why);
         }
         self.rebuilt = true;
-        let Some(window) = window else { return };
+        let Some(window) = self.window.clone() else { return };
         match self.set_up(window) {
             Ok(()) => self.channel.say("rebuilt", json!({ "problems": [why.json()] })),
             Err(problem) => self.give_up(event_loop, problem),
@@ -268,7 +276,7 @@ impl Preview {
     }
 
     /// Device, surface and panel for a window.
-    fn set_up(&mut self, window: Arc<winit::window::Window>) -> Result<(), Problem> {
+    fn set_up(&mut self, window: Arc<Window>) -> Result<(), Problem> {
         let screen = Screen::open(window.clone(), self.adapter.as_deref())?;
         // The panel's textures live on the device.
         self.egui = egui::Context::default();
@@ -282,160 +290,9 @@ impl Preview {
             Some(screen.gpu.device.limits().max_texture_dimension_2d as usize),
         ));
         self.screen = Some(screen);
-        self.told_picture = None;
-        window.request_redraw();
+        self.window = Some(window);
+        self.redraw_soon();
         Ok(())
-    }
-
-    /// One frame, if the window has pixels.
-    fn redraw(&mut self, event_loop: &ActiveEventLoop) {
-        let Some(mut screen) = self.screen.take() else { return };
-        if screen.size().is_none() {
-            self.screen = Some(screen);
-            return;
-        }
-        let drawn = self.frame(&mut screen);
-        let lost = screen.gpu.is_lost();
-        self.screen = Some(screen);
-        match drawn {
-            Ok(()) if !lost => self.tell_problems(),
-            Ok(()) => self.rebuild(event_loop, Problem::new(Cause::Unfinished, "the device was lost")),
-            Err(problem) => self.rebuild(event_loop, problem),
-        }
-    }
-
-    fn frame(&mut self, screen: &mut Screen) -> Result<(), Problem> {
-        // The device says only to those who ask that it is gone.
-        screen.gpu.device.poll(wgpu::PollType::Poll).ok();
-        screen.gpu.check("the window")?;
-        self.frames += 1;
-        let now = Instant::now();
-        self.play(now);
-        let (mut painting, wishes, repaint) = self.lay_out(screen);
-        wishes.into_iter().for_each(|wish| self.grant(wish, screen));
-        screen.gpu.timed = self.panel.timed && self.panel.shown;
-        // A small picture may take longer than the quiet after which the whole one is due.
-        let small = self.pace.share(now) < 1.0;
-        self.draw(screen, now);
-        let rest = small.then(|| self.pace.rest(Instant::now()).unwrap_or_else(Instant::now));
-        self.next = [rest, repaint].into_iter().flatten().min();
-        if !screen.present(&mut painting)? {
-            self.next = Some(now + Duration::from_millis(50));
-        }
-        if let Some(file) = self.capture.take() {
-            self.write_capture(screen, &painting, file);
-        }
-        Ok(())
-    }
-
-    fn play(&mut self, now: Instant) {
-        let Some((began, from)) = self.playing else { return };
-        // A frame that is on its way is finished first, or none ever would be.
-        if self.drawn.as_ref().is_none_or(|drawn| drawn.current)
-            && let Some(subject) = self.stage.subject()
-        {
-            let mut subject = subject.clone();
-            subject.look.view.time_s = from + (now - began).as_secs_f64();
-            self.pace.moved(now);
-            self.stage.want(subject);
-            self.redraw_soon();
-        }
-    }
-
-    /// Panel, picture and what is said over it: what to paint, what hands want, and when to do this again by itself.
-    fn lay_out(&mut self, screen: &mut Screen) -> (Painting, Vec<Wish>, Option<Instant>) {
-        self.note.take_if(|(since, _)| since.elapsed() > NOTE);
-        let problems = self.problems();
-        let Some(state) = &mut self.input else { unreachable!("a screen comes with its input") };
-        let input = state.take_egui_input(&screen.window);
-        let current = self.drawn.as_ref().is_some_and(|drawn| drawn.current);
-        let waits = match (current && !self.reads, self.stage.subject()) {
-            (true, _) => None,
-            (false, Some(_)) if !self.reads && problems.0.is_empty() => {
-                Some(Waits::ForStep(self.stage.progress(), self.drawn.is_some()))
-            }
-            (false, None) if problems.0.is_empty() => Some(Waits::ForFiles),
-            _ => None,
-        };
-        let said = Said { problems: &problems, waits, note: self.note.as_ref().map(|(_, note)| note.as_str()) };
-        let home = self.base.as_ref().map(|base| base.camera);
-        let subject = self.stage.subject().cloned();
-        let gpu = &screen.gpu;
-        let adapter = format!("{}{}", gpu.adapter.name, if gpu.is_software() { " (draws on the CPU)" } else { "" });
-        let facts = subject.as_ref().zip(home).map(|(subject, home)| Facts {
-            subject,
-            home,
-            viewing: &self.viewing,
-            drawn: self.drawn.as_ref(),
-            times: &self.times,
-            warnings: &self.warnings,
-            adapter,
-            playing: self.playing.is_some(),
-        });
-        let panel = &mut self.panel;
-        let mut wishes = Vec::new();
-        let mut place = egui::Rect::NOTHING;
-        let (playing, picture) = (self.playing.is_some(), screen.picture);
-        let output = self.egui.run_ui(input, |ui| {
-            wishes.clear();
-            overlay::keys(ui, home.map(Wish::Camera), panel.chosen, playing, &mut wishes);
-            if let Some(facts) = &facts
-                && panel.shown
-                && ui.available_width() >= panel::FITS
-            {
-                egui::Panel::right("panel").exact_size(panel::WIDTH).resizable(false).show(ui, |ui| {
-                    panel.ui(ui, facts, &mut wishes);
-                });
-            }
-            egui::CentralPanel::no_frame().show(ui, |ui| {
-                place = overlay::picture(ui, picture, &said, &mut wishes);
-            });
-        });
-        state.handle_platform_output(&screen.window, output.platform_output);
-        let pixels = place.size() * output.pixels_per_point;
-        self.place = (pixels.x.round().max(1.0) as u32, pixels.y.round().max(1.0) as u32);
-        let again = output.viewport_output.values().map(|viewport| viewport.repaint_delay).min();
-        let repaint = again.and_then(|delay| Instant::now().checked_add(delay));
-        let note = self.note.as_ref().map(|(since, _)| *since + NOTE);
-        let jobs = self.egui.tessellate(output.shapes, output.pixels_per_point);
-        let painting = Painting { jobs, textures: output.textures_delta, pixels_per_point: output.pixels_per_point };
-        (painting, wishes, [repaint, note].into_iter().flatten().min())
-    }
-
-    /// The newest picture that can be had.
-    fn draw(&mut self, screen: &mut Screen, now: Instant) {
-        let share = self.pace.share(now) * self.panel.quality;
-        let side = |pixels: u32| ((pixels as f64 * share).round() as u32).max(1);
-        self.viewing.size = (side(self.place.0), side(self.place.1));
-        let drawn = self.stage.draw(&screen.gpu, &self.viewing);
-        let Some(drawn) = drawn else {
-            self.drawn.iter_mut().for_each(|drawn| drawn.current = false);
-            self.tell_waiting();
-            return;
-        };
-        if !drawn.current {
-            self.tell_waiting();
-        }
-        let old = self.drawn.as_ref().map(|old| (old.key, old.current));
-        if old != Some((drawn.key, drawn.current)) {
-            self.redraw_soon(); // what was laid out before knew nothing of it
-        }
-        if drawn.finished.iter().any(|step| step.origin == Origin::Ran) {
-            self.pace.took(drawn.time, share);
-            self.times.note(&drawn.finished);
-            self.rebuilt = false;
-        }
-        let whole = self.viewing.size == self.place;
-        screen.show(&drawn.picture, whole);
-        if self.told_picture != Some(drawn.key) && self.channel.open {
-            self.told_picture = Some(drawn.key);
-            self.tell_picture(screen, &drawn, whole);
-        }
-        match &mut self.drawn {
-            // The same picture again: what it took is what it took when it was made.
-            Some(old) if old.key == drawn.key => old.current = drawn.current,
-            _ => self.drawn = Some(drawn),
-        }
     }
 }
 
@@ -445,9 +302,8 @@ impl ApplicationHandler<Brought> for Preview {
             return;
         }
         let name = self.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let attributes = winit::window::Window::default_attributes()
-            .with_title(format!("{name} - diaphane"))
-            .with_inner_size(self.size);
+        let attributes =
+            Window::default_attributes().with_title(format!("{name} - diaphane")).with_inner_size(self.size);
         let window = event_loop.create_window(attributes).map(Arc::new);
         let set_up = window
             .map_err(|error| Problem::new(Cause::Adapter, format!("no window can be opened: {error}")))

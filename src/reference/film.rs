@@ -3,6 +3,7 @@
 use super::path::Parts;
 use crate::image::Image;
 use crate::optics::Rgb;
+use crate::problem::counted;
 use crate::scene::Part;
 use serde::{Deserialize, Serialize};
 
@@ -39,6 +40,32 @@ pub struct Pixel {
     spread: [[f32; 3]; PARTS],
     /// Whether any sample met an object.
     pub is_object: bool,
+}
+
+/// How far a film is from the truth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Level {
+    /// Per pixel.
+    pub samples: u64,
+    /// See [`Film::relative_standard_error`].
+    pub error: f64,
+}
+
+impl Level {
+    /// Whether the error is known, and at most this.
+    pub fn reaches(&self, max_error: f64) -> bool {
+        self.samples > 1 && self.error <= max_error
+    }
+}
+
+impl std::fmt::Display for Level {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} per pixel", counted(self.samples as usize, "sample"))?;
+        match self.error.is_finite() {
+            true => write!(f, ", relative standard error {:.4}", self.error),
+            false => Ok(()),
+        }
+    }
 }
 
 /// Welford's running moments, f64.
@@ -133,6 +160,10 @@ impl Film {
             })
             .sum();
         (sum / count).sqrt()
+    }
+
+    pub fn level(&self, part: Part) -> Level {
+        Level { samples: self.samples, error: self.relative_standard_error(part) }
     }
 
     /// One film from films of other rows of the same picture. The error names what does not fit.

@@ -40,7 +40,7 @@ use crate::problem::Problem;
 use crate::scene::{Camera, LightKind, Object, Part, Scene, Sky, Substance, shape};
 use crate::store::{Bake, Key, Plan, Run, Slot, Step};
 use bssrdf::Bssrdf;
-use film::{Film, Moments};
+use film::{Film, Level, Moments};
 use glam::{DAffine3, DVec3};
 use light::{Kind, Lamp, SkyImage};
 use path::Inside;
@@ -76,21 +76,28 @@ pub struct Settings {
     pub rows: (u32, u32),
 }
 
-/// Adds the steps that bring the picture to `samples` per pixel, at least 1: a step for each doubling.
+/// Adds the steps that bring the picture to `samples` per pixel, at least 1.
 pub fn plan(plan: &mut Plan, scene: &Scene, settings: &Settings, samples: u64) -> Slot<Film> {
+    *doublings(plan, scene, settings, samples).last().expect("there is a first sample")
+}
+
+/// Likewise; gives the film of 1, 2, 4, … and at last `samples` paths per pixel.
+pub fn doublings(plan: &mut Plan, scene: &Scene, settings: &Settings, samples: u64) -> Vec<Slot<Film>> {
     let tracer = tracer(plan, scene, settings);
     let mut more = |samples, before| {
         let Settings { camera, size, seed, rows, .. } = *settings;
         plan.bake(Trace { tracer, camera, size, seed, rows, samples, before })
     };
     let mut film = more((0, 1), None);
+    let mut films = vec![film];
     let mut done = 1;
     while done < samples {
         let upto = (2 * done).min(samples);
         film = more((done, upto), Some(film));
+        films.push(film);
         done = upto;
     }
-    film
+    films
 }
 
 fn tracer(plan: &mut Plan, scene: &Scene, settings: &Settings) -> Slot<Tracer> {
@@ -228,6 +235,9 @@ impl Step for BuildTracer {
     }
 }
 
+/// The step that takes the time.
+pub const TRACE: &str = "reference.trace";
+
 /// More samples of every pixel, added to those before.
 #[derive(Serialize)]
 struct Trace {
@@ -244,10 +254,13 @@ struct Trace {
 impl Step for Trace {
     type Output = Film;
     fn name(&self) -> &'static str {
-        "reference.trace"
+        TRACE
     }
     fn about(&self) -> String {
         format!("paths {} to {} of each pixel", self.samples.0 + 1, self.samples.1)
+    }
+    fn continues(&self) -> Option<Slot<Film>> {
+        self.before
     }
     fn run(&self, run: &Run) -> Result<Film, Problem> {
         let tracer = run.get(self.tracer);
@@ -307,6 +320,27 @@ impl Step for Develop {
     }
     fn run(&self, run: &Run) -> Result<Image, Problem> {
         Ok(run.get(self.film).picture(self.part))
+    }
+}
+
+/// A film's level.
+#[derive(Serialize)]
+pub struct Judge {
+    pub film: Slot<Film>,
+    pub part: Part,
+}
+
+impl Step for Judge {
+    type Output = Level;
+    const NEEDS_HOST: bool = false;
+    fn name(&self) -> &'static str {
+        "reference.level"
+    }
+    fn about(&self) -> String {
+        "how far the paths scatter about their mean".into()
+    }
+    fn run(&self, run: &Run) -> Result<Level, Problem> {
+        Ok(run.get(self.film).level(self.part))
     }
 }
 

@@ -160,6 +160,17 @@ impl Store {
     pub fn adopt(&mut self, plan: &Plan, values: Values) {
         self.remember(plan);
         self.values.extend(values.0);
+        (0..plan.steps().len()).for_each(|index| self.leave_behind(plan, index));
+    }
+
+    /// Drops what a step went on from, if it did.
+    fn leave_behind(&mut self, plan: &Plan, index: usize) {
+        let step = &plan.steps()[index];
+        if let Some(earlier) = step.continues
+            && self.values.contains_key(&step.key)
+        {
+            self.values.remove(&plan.steps()[earlier as usize].key);
+        }
     }
 
     /// Whether a step's value is in memory by now; it may have come from disk.
@@ -225,28 +236,15 @@ impl Store {
             watch.warn(&problem);
         }
         self.values.insert(step.key, value);
+        self.leave_behind(plan, index as usize);
         watch.finished(&step.finished(Origin::Ran, time));
         Ok(())
     }
 
     /// What asking for `slot` would do to each step of the plan, in the plan's order.
     pub fn states<T>(&self, plan: &Plan, slot: Slot<T>) -> Vec<State> {
-        let mut states: Vec<State> = plan
-            .steps()
-            .iter()
-            .map(|step| {
-                let in_memory = step.is_given() || self.values.contains_key(&step.key);
-                let on_disk = || step.is_bake() && self.disk.as_ref().is_some_and(|disk| disk.holds(&step.key));
-                let origin = if in_memory {
-                    Origin::Memory
-                } else if on_disk() {
-                    Origin::Disk
-                } else {
-                    Origin::Ran
-                };
-                State { origin, needed: false }
-            })
-            .collect();
+        let state = |step| State { origin: self.origin(step), needed: false };
+        let mut states: Vec<State> = plan.steps().iter().map(state).collect();
         states[slot.index as usize].needed = true;
         for i in (0..states.len()).rev() {
             if states[i].needed && states[i].origin == Origin::Ran {
@@ -254,6 +252,22 @@ impl Store {
             }
         }
         states
+    }
+
+    fn origin(&self, step: &PlannedStep) -> Origin {
+        let on_disk = || step.is_bake() && self.disk.as_ref().is_some_and(|disk| disk.holds(&step.key));
+        if step.is_given() || self.values.contains_key(&step.key) {
+            Origin::Memory
+        } else if on_disk() {
+            Origin::Disk
+        } else {
+            Origin::Ran
+        }
+    }
+
+    /// Whether a value is in memory or on disk.
+    pub fn has<T>(&self, plan: &Plan, slot: Slot<T>) -> bool {
+        self.origin(&plan.steps()[slot.index as usize]) != Origin::Ran
     }
 
     pub fn disk(&self) -> Option<&Disk> {

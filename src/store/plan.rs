@@ -62,6 +62,12 @@ pub trait Step: Serialize + Send + Sync + 'static {
     /// Whether `run` asks for the host. What does not, and reads nothing that does, can be made on another thread while an
     /// older picture is looked at. No bake needs it, whatever is said here.
     const NEEDS_HOST: bool = true;
+
+    /// The step that this one goes on from: nobody asks for its value again once this one's is there, so it leaves memory
+    /// and stays on disk.
+    fn continues(&self) -> Option<Slot<Self::Output>> {
+        None
+    }
 }
 
 /// A step whose value is bytes, kept on disk.
@@ -128,6 +134,8 @@ pub struct PlannedStep {
     pub key: Key,
     /// The places of what it reads, all before its own.
     pub inputs: Vec<u32>,
+    /// The place of what it goes on from.
+    pub(super) continues: Option<u32>,
     pub(super) source: Source,
     needs_host: bool,
 }
@@ -194,6 +202,7 @@ impl Plan {
             about: about.into(),
             key,
             inputs: Vec::new(),
+            continues: None,
             source: Source::Given(value),
             needs_host: false,
         });
@@ -241,6 +250,7 @@ impl Plan {
             about: step.about(),
             key,
             inputs,
+            continues: step.continues().map(|slot| slot.index),
             source: source(Box::new(move |run| step.run(run).map(|value| Arc::new(value) as Value))),
             needs_host: S::NEEDS_HOST && code.is_none(),
         });

@@ -62,7 +62,7 @@ pub const REGISTRY: &[Entry] = &[
     Entry {
         name: Reference::NAME,
         manual: include_str!("reference.rs"),
-        // It has no part in a frame: `render::plan` asks for it before it makes one.
+        // It has no part in a frame: see `way`.
         read: |text| Reference::of(text).and_then(|_| Err(Reference::only_in_the_view(text))),
     },
 ];
@@ -82,7 +82,7 @@ const LATER: [&str; 11] = [
     "Auto",
 ];
 
-/// The technique that a scene or a flag names, with its settings read.
+/// The technique that an object or a flag names, with its settings read.
 pub fn read(text: &TechniqueText) -> Result<Box<dyn Technique>, Problem> {
     match REGISTRY.iter().find(|entry| entry.name == text.name) {
         Some(entry) => (entry.read)(text),
@@ -90,6 +90,22 @@ pub fn read(text: &TechniqueText) -> Result<Box<dyn Technique>, Problem> {
             Some((what, hint)) => text.problem("", what).hint(hint),
             None => text.unknown(&REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>()),
         }),
+    }
+}
+
+/// Who makes a view's pictures.
+pub enum Way {
+    /// They are drawn, by this technique where an object names none.
+    Drawn(Box<dyn Technique>),
+    /// The whole scene is traced.
+    Traced(Reference),
+}
+
+/// What a view's technique comes to, with its settings read.
+pub fn way(text: &TechniqueText) -> Result<Way, Problem> {
+    match Reference::of(text)? {
+        Some(reference) => Ok(Way::Traced(reference)),
+        None => read(text).map(Way::Drawn),
     }
 }
 

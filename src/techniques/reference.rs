@@ -6,7 +6,8 @@
 //! what the medium does, and is what that model makes when nothing else is approximated.
 //!
 //! Costs: seconds to hours. Samples double until the relative standard error of the picture is at most `max_error`, or
-//! `max_spp` is reached; each doubling is kept, so that the same picture goes on where it was. It asks for no adapter.
+//! `max_spp` is reached; each doubling is kept, so that the same picture goes on where it was. It asks for no adapter. A
+//! window shows every doubling as soon as it is there.
 //!
 //! Fails nowhere but in patience: noise falls with the square root of the time. What it leaves out: light of directional
 //! and point lights that is reflected inside a smooth boundary before it scatters for the first time.

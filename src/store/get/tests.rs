@@ -260,3 +260,44 @@ fn what_is_on_disk_is_work_for_another_thread_too_but_not_what_it_was_made_of() 
     assert_eq!(Store::on_disk(Disk::new(folder.path())).missing_without_host(&plan, text), [2]);
     assert_eq!(Store::in_memory().missing_without_host(&plan, text), [0, 1, 2]);
 }
+
+/// A number that goes on from an earlier one.
+#[derive(serde::Serialize)]
+struct GoOn(Option<Slot<i64>>);
+impl Step for GoOn {
+    type Output = i64;
+    fn name(&self) -> &'static str {
+        "test.go_on"
+    }
+    fn about(&self) -> String {
+        "one more".into()
+    }
+    fn run(&self, run: &Run) -> Result<i64, Problem> {
+        Ok(1 + self.0.map_or(0, |slot| *run.get(slot)))
+    }
+    fn continues(&self) -> Option<Slot<i64>> {
+        self.0
+    }
+}
+impl Bake for GoOn {
+    const CODE: &'static [&'static str] = &["src/store/get/"];
+}
+
+#[test]
+fn what_was_gone_on_from_leaves_memory_and_stays_on_disk() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut store = Store::on_disk(Disk::new(folder.path()));
+    let mut plan = Plan::default();
+    let first = plan.bake(GoOn(None));
+    let second = plan.bake(GoOn(Some(first)));
+    let third = plan.bake(GoOn(Some(second)));
+    assert_eq!((*store.get(&plan, third).unwrap(), store.len()), (3, 1));
+    assert!(store.has(&plan, first) && store.has(&plan, second));
+    // Another store that has it already drops it when it takes over what follows.
+    let mut other = Store::in_memory();
+    other.get(&plan, first).unwrap();
+    assert!(other.has(&plan, first) && !other.has(&plan, third));
+    other.adopt(&plan, store.held(&plan));
+    assert!(!other.has(&plan, first) && other.has(&plan, third));
+    assert_eq!(*store.get(&plan, first).unwrap(), 1);
+}
