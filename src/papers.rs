@@ -82,10 +82,6 @@ pub const PAPERS: &[Paper] = &[
         "Tomaszewska2012",
         "A. Tomaszewska & K. Stefanowski. Real-Time Spherical Harmonics Based Subsurface Scattering. ICIAR 2012",
     ),
-    paper(
-        "Vorba2016",
-        "J. Vorba & J. Krivanek. Adjoint-Driven Russian Roulette and Splitting in Light Transport Simulation. SIGGRAPH 2016",
-    ),
     paper("Walter2007", "B. Walter et al. Microfacet Models for Refraction through Rough Surfaces. EGSR 2007"),
     paper(
         "Walter2009",

@@ -8,7 +8,6 @@
 //! | [`surfaces`] | what surfaces do that paths do not enter |
 //! | [`boundary`] | reflection and refraction, smooth and rough |
 //! | [`refracted`] | lamps without extent, seen from inside through a smooth boundary |
-//! | [`guide`] | how much light there is inside things, roughly, so that paths go where it is |
 //! | [`lobe`] | the same through a rough one |
 //! | [`light`] | lamps and the surroundings |
 //! | [`world`] | the scene as rays see it |
@@ -23,7 +22,6 @@
 pub mod boundary;
 pub mod bssrdf;
 pub mod film;
-pub mod guide;
 pub mod light;
 pub mod lobe;
 pub mod path;
@@ -225,13 +223,21 @@ impl Step for BuildTracer {
                 refracted.extend(Refracted::new(&world, i, &lamp.kind, thing));
             }
         }
+        let lamp_of = world
+            .things
+            .iter()
+            .map(|thing| match thing.matter {
+                Matter::Emitter(lamp) => Some(lamp),
+                _ => None,
+            })
+            .collect();
         let sky = self.sky.as_ref().map(|sky| light::Sky {
             scale: sky.scale,
             image: sky.image.map(|image| SkyImage::new(run.get(image), sky.rotation)),
             shadow: sky.shadow,
         });
         let lamps = self.lamps.clone();
-        Ok(Tracer::new(world, lamps, sky, refracted, self.light, self.max_depth))
+        Ok(Tracer { world, lamps, sky, lamp_of, refracted, light: self.light, max_depth: self.max_depth, joins: true })
     }
 }
 

@@ -82,7 +82,6 @@ impl Weight {
 }
 
 /// A path on its way.
-#[derive(Clone, Copy)]
 pub struct Walk {
     pub origin: DVec3,
     pub direction: DVec3,
@@ -96,8 +95,6 @@ pub struct Walk {
     /// The thing in which the path was scattered last and where, as long as it has not met a surface since: there lamps
     /// without extent were joined to it.
     pub lobes: Option<(usize, DVec3)>,
-    /// What the path promised where it was scattered first, in a thing that has a [`super::guide`].
-    pub promise: Option<f64>,
     /// Multiplies the light once it has scattered.
     pub color: Rgb,
     pub scattered: bool,
@@ -110,13 +107,6 @@ pub struct Walk {
 pub struct Sum {
     pub scattered: Rgb,
     pub unscattered: Rgb,
-}
-
-impl std::ops::AddAssign for Sum {
-    fn add_assign(&mut self, other: Sum) {
-        self.scattered += other.scattered;
-        self.unscattered += other.unscattered;
-    }
 }
 
 impl Walk {

@@ -33,8 +33,13 @@ fn tracer(things: Vec<(Mesh, Matter)>, lamps: Vec<Lamp>, sky: Option<f64>, light
         (0..world.things.len()).filter_map(move |thing| Refracted::new(world, i, &kind, thing)).collect::<Vec<_>>()
     };
     let refracted = lamps.iter().enumerate().flat_map(beams).collect();
+    let lamp_of = world
+        .things
+        .iter()
+        .map(|thing| if let Matter::Emitter(lamp) = thing.matter { Some(lamp) } else { None })
+        .collect();
     let sky = sky.map(|radiance| light::Sky { scale: Rgb::splat(radiance), image: None, shadow: true });
-    Tracer::new(world, lamps, sky, refracted, light, max_depth)
+    Tracer { world, lamps, sky, lamp_of, refracted, light, max_depth, joins: true }
 }
 
 fn sun(direction: DVec3) -> Lamp {
@@ -189,30 +194,6 @@ fn beams_agree_with_paths_on_a_curved_boundary() {
         assert!(z.abs().max_element() < 4.0, "{what}");
         assert!((b_error / b).min_element() < 0.05, "{what} proves too little");
     }
-}
-
-/// Where paths are split and ended changes no mean, and pays where the light is far from the eye.
-#[test]
-fn guides_change_nothing_but_noise() {
-    let matter = translucent(1.3, 0.0, Rgb::new(0.02, 0.05, 0.1), Rgb::splat(8.0), 0.2);
-    let rect = Kind::Rect { center: -4.0 * DVec3::Z, u: 2.0 * DVec3::X, v: 2.0 * DVec3::Y, radiance: Rgb::ONE };
-    let lamp = || vec![Lamp { kind: rect.clone(), shadow: false }];
-    let body = || vec![(shapes::sphere(1.0, 3), matter.clone())];
-    let guided = tracer(body(), lamp(), None, Light::Direct, 100_000);
-    let mut alone = tracer(body(), lamp(), None, Light::Direct, 100_000);
-    assert!(alone.guides[0].take().is_some());
-    let eye = |random: &mut Random| {
-        let (a, b) = random.pair();
-        (DVec3::new(a - 0.5, b - 0.5, 5.0), DVec3::NEG_Z)
-    };
-    let (a, a_error) = measure(&guided, 10_000, eye, |p| p.scattered);
-    let (b, b_error) = measure(&alone, 60_000, eye, |p| p.scattered);
-    let z = (a - b) / (a_error * a_error + b_error * b_error).sqrt();
-    let what = format!("{a} +- {a_error}, {b} +- {b_error}, z {z}");
-    assert!(z.abs().max_element() < 4.0, "{what}");
-    assert!((b_error / b).min_element() < 0.04, "{what} proves too little");
-    // Six times as many paths alone are not surer.
-    assert!(a_error.element_sum() < 1.2 * b_error.element_sum(), "{what}");
 }
 
 #[test]

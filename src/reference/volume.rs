@@ -9,7 +9,6 @@
 //! Radiance is counted per squared index of the medium that it travels in. Lengths are scene units.
 
 use super::boundary::Facing;
-use super::guide::{self, Guide};
 use super::light::{Kind, Lamp, Ray, Sky};
 use super::lobe::Lobe;
 use super::path::{Inside, Parts, Sum, Walk, Weight};
@@ -20,7 +19,6 @@ use super::world::{Boundary, Matter, Medium, Place, Point, Thing, World};
 use crate::optics::Rgb;
 use crate::optics::fresnel::fresnel_dielectric;
 use glam::DVec3;
-use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Which light counts.
@@ -41,8 +39,6 @@ pub struct Tracer {
     /// Which lamp each emitter of the world is.
     pub lamp_of: Vec<Option<usize>>,
     pub refracted: Vec<Refracted>,
-    /// Of each thing.
-    pub guides: Vec<Option<Guide>>,
     pub light: Light,
     pub max_depth: u32,
     /// Whether lamps with extent and the sky are joined to vertices. Without, paths must find them by themselves: the same
@@ -51,29 +47,6 @@ pub struct Tracer {
 }
 
 impl Tracer {
-    pub fn new(
-        world: World,
-        lamps: Vec<Lamp>,
-        sky: Option<Sky>,
-        refracted: Vec<Refracted>,
-        light: Light,
-        max_depth: u32,
-    ) -> Tracer {
-        let lamp_of = world
-            .things
-            .iter()
-            .map(|thing| match thing.matter {
-                Matter::Emitter(lamp) => Some(lamp),
-                _ => None,
-            })
-            .collect();
-        let count = world.things.len();
-        let mut tracer =
-            Tracer { world, lamps, sky, lamp_of, refracted, guides: Vec::new(), light, max_depth, joins: true };
-        tracer.guides = (0..count).into_par_iter().map(|thing| Guide::new(&tracer, thing)).collect();
-        tracer
-    }
-
     /// One path from the eye, which lies inside the things `inside`; and whether it meets an object.
     pub fn trace(&self, eye: DVec3, direction: DVec3, inside: Inside, random: &mut Random) -> (Parts, bool) {
         let mut parts = Parts::default();
@@ -143,7 +116,6 @@ impl Tracer {
             density: None,
             counted: false,
             lobes: None,
-            promise: None,
             color: Rgb::ONE,
             scattered: false,
             depth: 0,
@@ -237,17 +209,7 @@ impl Tracer {
     }
 
     /// Follows a path to its end. `met` is what its ray meets first, if that is known already.
-    fn walk_from(&self, walk: Walk, met: Option<Point>, random: &mut Random) -> Sum {
-        let mut waiting = Vec::new();
-        let mut sum = self.walk_one(walk, met, &mut waiting, random);
-        while let Some(walk) = waiting.pop() {
-            sum += self.walk_one(walk, None, &mut waiting, random);
-        }
-        sum
-    }
-
-    /// Follows one path, and leaves those that it is split into.
-    fn walk_one(&self, mut walk: Walk, mut met: Option<Point>, waiting: &mut Vec<Walk>, random: &mut Random) -> Sum {
+    fn walk_from(&self, mut walk: Walk, mut met: Option<Point>, random: &mut Random) -> Sum {
         loop {
             let medium = self.medium(walk.inside);
             let sigma_t = medium.map_or(Rgb::ZERO, Medium::sigma_t);
@@ -277,16 +239,6 @@ impl Tracer {
                     walk.origin += free * walk.direction;
                     walk.on = None;
                     self.scatter(&mut walk, medium, random);
-                    if let Some(guide) = walk.inside.innermost().and_then(|thing| self.guides[thing].as_ref()) {
-                        let now = guide.promise(walk.origin, walk.weight.value);
-                        let (count, weight) = guide::paths(now, *walk.promise.get_or_insert(now), random);
-                        if count == 0 {
-                            return walk.sum;
-                        }
-                        walk.weight.value *= weight;
-                        waiting.extend((1..count).map(|_| Walk { sum: Sum::default(), ..walk }));
-                        continue;
-                    }
                 }
                 // Away; or out of a mesh that is not closed, where nobody can tell what light would come.
                 (None, _) => return walk.sum,
