@@ -82,6 +82,8 @@ pub struct Walk {
     pub direction: DVec3,
     pub on: Option<Place>,
     pub inside: Inside,
+    /// How deep `origin` lies in the innermost thing, where that is known.
+    pub below: Option<f64>,
     pub weight: Weight,
     /// Of `direction`, where a lamp could have been joined to the path's last vertex instead.
     pub density: Option<f64>,
@@ -90,6 +92,8 @@ pub struct Walk {
     /// Multiplies the light once it has scattered.
     pub color: Rgb,
     pub scattered: bool,
+    /// Whether it has scattered since it came from the open.
+    pub struck: bool,
     pub depth: u32,
     pub sum: Sum,
 }

@@ -52,7 +52,7 @@ const PIECES: usize = 64;
 impl Refracted {
     /// None where no light is refracted: an index of 1, a rough boundary, a lamp with extent.
     pub fn new(world: &World, lamp: usize, kind: &Kind, thing: usize) -> Option<Refracted> {
-        let Matter::Translucent { surface, medium } = &world.things[thing].matter else { return None };
+        let Matter::Translucent { surface, .. } = &world.things[thing].matter else { return None };
         if surface.ior == 1.0 || matches!(kind, Kind::Rect { .. }) || !is_smooth(surface) {
             return None;
         }
@@ -71,7 +71,7 @@ impl Refracted {
         // Every point inside lies within the thing's own box, so no beam need be longer than its diagonal.
         let bounds = body.mesh.bounds();
         let diagonal = bounds.diagonal();
-        let sigma = medium.sigma_t().min_element();
+        let sigma = world.fill(thing).thinnest();
         let reach = if sigma > 0.0 { diagonal.min(FAINTEST / sigma) } else { diagonal };
         let (center, scale) = (0.5 * (min + max), (max - min).max_element().max(f64::MIN_POSITIVE));
         let boxed: Vec<Vec<Aabb>> =
@@ -83,8 +83,16 @@ impl Refracted {
     }
 
     /// Calls `found` for every direction from `p`, inside the thing, in which the boundary shows the lamp: the direction
-    /// towards it, and irradiance on a particle there, per squared index.
-    pub fn each(&self, world: &World, p: DVec3, sigma_t: Rgb, shadow: bool, mut found: impl FnMut(DVec3, Rgb)) {
+    /// towards it, and irradiance on a particle there, per squared index. `through` is the share of light that a direction
+    /// and a length leave.
+    pub fn each(
+        &self,
+        world: &World,
+        p: DVec3,
+        shadow: bool,
+        mut through: impl FnMut(DVec3, f64) -> Rgb,
+        mut found: impl FnMut(DVec3, Rgb),
+    ) {
         let local = ((p - self.center) / self.scale).as_vec3a();
         // The pieces of one triangle overlap: each triangle counts once.
         let mut seen: [u32; 256] = [u32::MAX; 256];
@@ -110,7 +118,7 @@ impl Refracted {
         for &i in seen[..count].iter().chain(&far) {
             let triangle = &self.triangles[i as usize];
             let Some(at) = triangle.solve(&self.kind, self.ior, p) else { continue };
-            if let Some((direction, light)) = self.light(world, triangle, at, p, sigma_t, shadow) {
+            if let Some((direction, light)) = self.light(world, triangle, at, p, shadow, &mut through) {
                 found(direction, light);
             }
         }
@@ -122,8 +130,8 @@ impl Refracted {
         triangle: &Triangle,
         at: DVec2,
         p: DVec3,
-        sigma_t: Rgb,
         shadow: bool,
+        through: &mut impl FnMut(DVec3, f64) -> Rgb,
     ) -> Option<(DVec3, Rgb)> {
         let q = triangle.point(at);
         let (to, length) = ((q - p).normalize(), (q - p).length());
@@ -147,7 +155,7 @@ impl Refracted {
             Kind::Rect { .. } => unreachable!("a lamp with extent is found by paths"),
         };
         let spread = self.spread(triangle, p, to, length)?;
-        let through = (1.0 - split.reflectance) * (-sigma_t * length).exp();
+        let through = (1.0 - split.reflectance) * through(to, length);
         Some((to, through * power / spread))
     }
 

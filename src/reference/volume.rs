@@ -1,14 +1,21 @@
-//! The volumetric truth: unbiased random walks through homogeneous media inside any closed mesh, in f64.
+//! The volumetric truth: unbiased random walks through the media inside any closed mesh, in f64.
 //!
-//! A path starts at the eye. Free paths are exponential, directions follow the phase function, boundaries reflect and
-//! refract by Fresnel or by GGX microfacets; nothing is approximated. One path serves three channels: its free paths are
-//! drawn for one of them, and its weight is the balance heuristic over all three (spectral multiple importance sampling
-//! [Wilkie2014]), so that no channel's weight exceeds 3. Lamps are joined to each vertex that can see them; those
-//! without extent also through a smooth refracting boundary ([`super::refracted`]), where no path would find them.
+//! A path starts at the eye. Free paths are as the medium has them ([`super::free_path`]), directions follow the phase
+//! function, boundaries reflect and refract by Fresnel or by GGX microfacets; nothing is approximated. One path serves three
+//! channels: its free paths are drawn for one of them, and its weight is the balance heuristic over all three (spectral
+//! multiple importance sampling [Wilkie2014]), so that no channel's weight exceeds 3. Lamps are joined to each vertex that
+//! can see them; those without extent also through a smooth refracting boundary ([`super::refracted`]), where no path would
+//! find them.
+//!
+//! Of *single* scattering ([`Tracer::single`]) those paths are left that, between coming into a thing's media from the open
+//! and leaving them, scatter once at most, at a particle or at paint, and are nowhere reflected inside: one refraction in, one
+//! event, one refraction out. Lamps are joined and found as ever. What is reflected outside, and what passes straight
+//! through by one refraction in and one out, are the picture's other parts as ever.
 //!
 //! Radiance is counted per squared index of the medium that it travels in. Lengths are scene units.
 
 use super::boundary::Facing;
+use super::free_path::End;
 use super::light::{Lamp, Ray, Sky};
 use super::path::{Inside, Parts, Sum, Walk, Weight};
 use super::random::Random;
@@ -40,6 +47,8 @@ pub struct Tracer {
     pub refracted: Vec<Refracted>,
     pub light: Light,
     pub max_depth: u32,
+    /// Whether light scatters only once in what it enters.
+    pub single: bool,
     /// Whether lamps with extent and the sky are joined to vertices. Without, paths must find them by themselves: the same
     /// picture, with more noise.
     pub joins: bool,
@@ -111,11 +120,13 @@ impl Tracer {
             direction,
             on,
             inside,
+            below: None,
             weight: Weight::new(random),
             density: None,
             counted: false,
             color: Rgb::ONE,
             scattered: false,
+            struck: false,
             depth: 0,
             sum: Sum::default(),
         }
@@ -168,17 +179,6 @@ impl Tracer {
         sum
     }
 
-    fn medium(&self, inside: Inside) -> Option<&Medium> {
-        inside.innermost().map(|i| match &self.world.things[i].matter {
-            Matter::Translucent { medium, .. } => medium,
-            _ => unreachable!("paths enter only what is translucent"),
-        })
-    }
-
-    fn sigma_t(&self, inside: Inside) -> Rgb {
-        self.medium(inside).map_or(Rgb::ZERO, Medium::sigma_t)
-    }
-
     fn is_emitter(&self, point: &Point) -> bool {
         matches!(self.world.things[point.thing()].matter, Matter::Emitter(_))
     }
@@ -209,37 +209,31 @@ impl Tracer {
     /// Follows a path to its end. `met` is what its ray meets first, if that is known already.
     fn walk_from(&self, mut walk: Walk, mut met: Option<Point>, random: &mut Random) -> Sum {
         loop {
-            let medium = self.medium(walk.inside);
-            let sigma_t = medium.map_or(Rgb::ZERO, Medium::sigma_t);
-            let free = match sigma_t[walk.weight.hero] {
-                0.0 => f64::INFINITY,
-                sigma => random.exponential() / sigma,
+            let flight = match self.single && walk.struck {
+                true => self.passage(&walk, random),
+                false => self.flight(&walk, met.take(), random),
             };
-            let point = met.take().or_else(|| self.world.meet(walk.origin, walk.direction, free, walk.on));
-            if medium.is_none() && !std::mem::replace(&mut walk.counted, false) {
-                walk.add(self.shining(walk.origin, walk.direction, point.as_ref(), walk.density));
+            if walk.inside.is_nothing() && !std::mem::replace(&mut walk.counted, false) {
+                walk.add(self.shining(walk.origin, walk.direction, flight.end.surface(), walk.density));
             }
             if walk.depth >= self.max_depth {
                 return walk.sum;
             }
             walk.depth += 1;
-            match (point, medium) {
-                (Some(point), _) => {
-                    let through = (-sigma_t * point.t).exp();
-                    walk.weight.event(through, through);
+            walk.weight = flight.weight;
+            match flight.end {
+                End::Surface(point) => {
+                    walk.below = None;
                     if !self.cross(&mut walk, point, random) {
                         return walk.sum;
                     }
+                    walk.struck &= !walk.inside.is_nothing();
                 }
-                (None, Some(medium)) if free.is_finite() => {
-                    let through = (-sigma_t * free).exp();
-                    walk.weight.event(medium.sigma_s * through, sigma_t * through);
-                    walk.origin += free * walk.direction;
-                    walk.on = None;
+                End::Particle(p, medium, below) => {
+                    (walk.origin, walk.on, walk.below) = (p, None, below);
                     self.scatter(&mut walk, medium, random);
                 }
-                // Away; or out of a mesh that is not closed, where nobody can tell what light would come.
-                (None, _) => return walk.sum,
+                End::Away => return walk.sum,
             }
             // Roulette by weight: what is left of the light decides, so that high albedos live long.
             let left = walk.weight.value.max_element();
@@ -254,14 +248,14 @@ impl Tracer {
 
     /// A path meets a medium's particle: light that is scattered there, and the way on.
     fn scatter(&self, walk: &mut Walk, medium: &Medium, random: &mut Random) {
-        walk.scattered = true;
+        (walk.scattered, walk.struck) = (true, true);
         let from = walk.direction;
         // Channels may scatter differently: the direction is drawn for the hero, and weighs like a free path.
         let phase =
             |to: DVec3| Rgb::from_array(medium.parameter.to_array().map(|k| medium.phase.value(-from.dot(to), k)));
         self.join_lamps(walk, |lamp| self.is_joined(lamp), phase, random);
         if let Some((ray, shadow)) = self.sky_sample(random) {
-            self.join(walk, &ray, shadow, phase(ray.direction));
+            self.join(walk, &ray, shadow, phase(ray.direction), random);
         }
         let parameter = medium.parameter[walk.weight.hero];
         walk.direction = around(from, -medium.phase.sample(random.unit(), parameter), random.unit());
@@ -279,39 +273,42 @@ impl Tracer {
         random: &mut Random,
     ) {
         let innermost = walk.inside.innermost();
+        let (p, below, fill) = (walk.origin, walk.below, self.fill(walk.inside));
         for (i, lamp) in self.lamps.iter().enumerate().filter(|(_, lamp)| wanted(lamp)) {
             for refracted in self.refracted.iter().filter(|r| r.lamp == i && Some(r.thing) == innermost) {
-                refracted.each(&self.world, walk.origin, self.sigma_t(walk.inside), lamp.shadow, |to, light| {
+                let through = |to, length| fill.transmittance(p, below, to, length, random);
+                refracted.each(&self.world, p, lamp.shadow, through, |to, light| {
                     walk.sum.scattered += walk.color * walk.weight.value * phase(to) * light;
                 });
             }
-            if let Some(ray) = lamp.sample(walk.origin, random) {
-                self.join(walk, &ray, lamp.shadow, phase(ray.direction));
+            if let Some(ray) = lamp.sample(p, random) {
+                self.join(walk, &ray, lamp.shadow, phase(ray.direction), random);
             }
         }
     }
 
     /// Adds a lamp's light at a vertex in a medium, straight through boundaries that do not refract.
-    fn join(&self, walk: &mut Walk, ray: &Ray, shadow: bool, phase: Rgb) {
+    fn join(&self, walk: &mut Walk, ray: &Ray, shadow: bool, phase: Rgb, random: &mut Random) {
         let (mut p, mut on, mut inside, mut left) = (walk.origin, walk.on, walk.inside, ray.distance);
-        let mut through = Rgb::ONE;
+        let (mut through, mut below) = (Rgb::ONE, walk.below);
         let mut is_out = false;
         loop {
             let met = self.world.meet(p, ray.direction, left * (1.0 - 1e-9), on);
-            if !inside.is_nothing() {
-                let length = met.as_ref().map_or(left, |point| point.t);
-                through *= (-self.sigma_t(inside) * length).exp();
-            }
-            let Some(point) = met else { break };
-            if is_out && !shadow {
+            if is_out && (met.is_none() || !shadow) {
                 break;
             }
-            let Matter::Translucent { surface, .. } = &self.world.things[point.thing()].matter else { return };
-            let leaves = ray.direction.dot(point.flat) > 0.0;
-            // Direct light is let in by the thing that it is scattered in, and by no other.
-            if surface.ior != 1.0 || self.light == Light::Direct && (is_out || !leaves) {
-                return;
+            if let Some(point) = &met {
+                let Matter::Translucent { surface, .. } = &self.world.things[point.thing()].matter else { return };
+                // Direct light is let in by the thing that it is scattered in, and by no other.
+                let is_elsewhere = self.light == Light::Direct && (is_out || ray.direction.dot(point.flat) <= 0.0);
+                if surface.ior != 1.0 || is_elsewhere {
+                    return;
+                }
             }
+            let length = met.as_ref().map_or(left, |point| point.t);
+            through *= self.fill(inside).transmittance(p, below.take(), ray.direction, length, random);
+            let Some(point) = met else { break };
+            let leaves = ray.direction.dot(point.flat) > 0.0;
             inside = if leaves { inside.without(point.thing()) } else { inside.with(point.thing()) };
             is_out = inside.innermost().is_none();
             (p, on, left) = (point.p, Some(point.place), left - point.t);
@@ -342,7 +339,10 @@ impl Tracer {
             }
             Matter::Opaque { surface, albedo } => {
                 // An opaque thing within a medium: white paint whose boundary the medium wets.
-                walk.scattered = true;
+                if self.single && walk.struck {
+                    return false;
+                }
+                (walk.scattered, walk.struck) = (true, true);
                 let normal = if d.dot(point.normal) < 0.0 { point.normal } else { -point.normal };
                 let (u, v) = random.pair();
                 walk.weight.value *= *albedo * thing.color(surface, &point);
@@ -399,13 +399,16 @@ impl Tracer {
             let chosen = is_lit && self.light == Light::Full;
             walk.weight.value *= if chosen { reflected_share / split.reflectance } else { reflected_share };
             (walk.direction, walk.density) = (split.reflected, None);
-            return reflected_share > 0.0;
+            return reflected_share > 0.0 && !self.single;
         }
         let goes_in = out.is_some() && random.unit() >= split.reflectance;
         if goes_in {
             walk.weight.value *= refracted_share / (1.0 - split.reflectance);
             (walk.direction, walk.inside) = (out.expect("it goes in"), beyond);
         } else {
+            if self.single && !walk.inside.is_nothing() {
+                return false;
+            }
             // Where nothing can be refracted this is certain, and else chosen with the reflectance.
             let chance = if out.is_some() { split.reflectance } else { 1.0 };
             walk.weight.value *= reflected_share / chance;

@@ -80,7 +80,7 @@ fn the_truth_says_how_far_it_is() {
     assert!(near["relative_standard_error"].as_f64().unwrap() <= 0.5);
     run(&["--seconds", "0.2"]).ok();
     run(&["--seconds", "0"]).fails(2, &["--seconds"]);
-    run(&["--integrator", "layered"]).fails(2, &["--integrator"]);
+    run(&["--integrator", "walks"]).fails(2, &["--integrator"]);
     run(&["--spp", "0"]).fails(2, &["--spp"]);
     run(&["--variance", "v.png"]).fails(2, &["--variance", ".exr"]);
 }
