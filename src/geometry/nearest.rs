@@ -34,6 +34,12 @@ pub struct Closest {
     pub barycentrics: DVec2,
 }
 
+/// The best place so far among `corners`, and its squared distance in tree coordinates.
+struct Best {
+    squared: f64,
+    found: Option<(usize, DVec2)>,
+}
+
 impl Nearest {
     pub fn new(mesh: &Mesh) -> Nearest {
         let extent = mesh.positions.iter().map(|p| p.abs().max_element()).fold(0.0, f32::max) as f64;
@@ -46,34 +52,32 @@ impl Nearest {
         Nearest { corners: source.iter().map(|&i| corners[i as usize]).collect(), source, tree, scale }
     }
 
-    /// The mesh's point that is closest to `p`; of several, one of them. None without triangles.
-    pub fn find(&self, p: DVec3) -> Option<Closest> {
-        let mut best: Option<(f64, Closest)> = None;
+    /// The mesh's point that is closest to `p`, of several one of them. None where nothing lies nearer than `within`: the
+    /// sooner it may give up, the less is searched.
+    pub fn find(&self, p: DVec3, within: f64) -> Option<Closest> {
+        let mut best = Best { squared: (within / self.scale).powi(2), found: None };
         if !self.tree.nodes.is_empty() {
             self.visit(0, p / self.scale, &mut best);
         }
-        best.map(|(_, closest)| closest)
+        let (place, barycentrics) = best.found?;
+        Some(Closest { distance: best.squared.sqrt() * self.scale, triangle: self.source[place], barycentrics })
     }
 
-    /// `best` has its squared distance in tree coordinates.
-    fn visit(&self, node: usize, p: DVec3, best: &mut Option<(f64, Closest)>) {
+    fn visit(&self, node: usize, p: DVec3, best: &mut Best) {
         let node = &self.tree.nodes[node];
         let first = node.first_index as usize;
-        let is_nearer = |best: &Option<(f64, Closest)>, squared: f64| best.is_none_or(|(least, _)| squared < least);
         if node.is_leaf() {
             for i in first..first + node.prim_count as usize {
                 let (squared, barycentrics) = closest(self.corners[i].map(|corner| corner.as_dvec3()), p);
-                if is_nearer(best, squared) {
-                    let distance = squared.sqrt() * self.scale;
-                    *best = Some((squared, Closest { distance, triangle: self.source[i], barycentrics }));
+                if squared < best.squared {
+                    *best = Best { squared, found: Some((i, barycentrics)) };
                 }
             }
             return;
         }
-        let mut children = [first, first + 1].map(|child| (self.box_distance_squared(child, p), child));
-        children.sort_by(|a, b| a.0.total_cmp(&b.0));
-        for (squared, child) in children {
-            if is_nearer(best, squared) {
+        let [a, b] = [first, first + 1].map(|child| (self.box_distance_squared(child, p), child));
+        for (squared, child) in if a.0 <= b.0 { [a, b] } else { [b, a] } {
+            if squared < best.squared {
                 self.visit(child, p, best);
             }
         }
@@ -161,8 +165,10 @@ mod tests {
                 let nearest = Nearest::new(&mesh);
                 for (i, d) in directions(256).into_iter().enumerate() {
                     let p = scale * (center + size * [0.1, 0.45, 1.0, 30.0][i % 4] * d);
-                    let found = nearest.find(p).unwrap();
+                    let found = nearest.find(p, f64::INFINITY).unwrap();
                     let expected = brute_force(&mesh, p);
+                    assert_eq!(nearest.find(p, 1.001 * expected), Some(found));
+                    assert_eq!(nearest.find(p, 0.999 * expected), None);
                     assert!((found.distance - expected).abs() <= 1e-14 * expected, "{found:?} {expected}");
                     let [a, b, c] = mesh.corners(found.triangle as usize);
                     let at = found.barycentrics;
@@ -177,9 +183,9 @@ mod tests {
     fn the_depth_below_a_plane_has_all_its_digits() {
         let slab = Nearest::new(&shapes::slab(DVec3::new(40.0, 20.0, 40.0), (3, 3)));
         for depth in [0.0, 1e-12, 0.1, 1.0 / 3.0, 7.0] {
-            let found = slab.find(DVec3::new(0.7, 10.0 - depth, -0.3)).unwrap();
+            let found = slab.find(DVec3::new(0.7, 10.0 - depth, -0.3), f64::INFINITY).unwrap();
             assert!((found.distance - depth).abs() < 4e-15, "{found:?}");
         }
-        assert_eq!(Nearest::new(&Mesh::default()).find(DVec3::ZERO), None);
+        assert_eq!(Nearest::new(&Mesh::default()).find(DVec3::ZERO, f64::INFINITY), None);
     }
 }

@@ -16,6 +16,9 @@ use super::world::{Matter, Medium, Point, Thing, World};
 use crate::optics::Rgb;
 use glam::DVec3;
 
+/// The share of light below which it is a matter of chance whether more of its way is looked at.
+const FAINT: f64 = 0.01;
+
 /// What is in the space that a path goes through.
 #[derive(Clone, Copy)]
 pub enum Fill<'a> {
@@ -90,7 +93,7 @@ impl Fill<'_> {
         }
         let mut depth = below.unwrap_or_else(|| strata.at(thing, origin).0);
         let (mut through, mut t) = (Rgb::ONE, 0.0);
-        while through != Rgb::ZERO {
+        loop {
             let Around { radius, least, most } = strata.around(depth);
             let rate = (most - least).max_element();
             let stretch = radius.min(length - t);
@@ -104,6 +107,14 @@ impl Fill<'_> {
             depth = deep;
             if step < stretch {
                 through *= 1.0 - (medium.sigma_t() - least) / rate;
+            }
+            // Roulette: of what hardly counts most is let go, and the rest stands for it.
+            let left = through.max_element();
+            if left < FAINT {
+                if random.unit() >= left / FAINT {
+                    return Rgb::ZERO;
+                }
+                through *= FAINT / left;
             }
         }
         through

@@ -40,6 +40,8 @@ pub struct Strata {
     strata: Vec<Stratum>,
     /// One mean free path where it is shortest.
     finest: f64,
+    /// Deeper than two mean free paths below all layers, depths are not told apart.
+    deep: f64,
 }
 
 struct Stratum {
@@ -62,10 +64,12 @@ impl Strata {
     pub fn of(thing: &Thing) -> Option<Strata> {
         let Matter::Translucent { medium, layers: Some(layers), .. } = &thing.matter else { return None };
         let mut strata = Vec::new();
-        let mut from = f64::NEG_INFINITY;
+        let (mut from, mut deepest) = (f64::NEG_INFINITY, 0.0f64);
         for layer in &layers.list {
             let (low, high) = extremes(&layer.depth);
-            strata.push(Stratum { medium: layer.medium.clone(), from, to: high / layers.mm_per_unit });
+            let to = high / layers.mm_per_unit;
+            strata.push(Stratum { medium: layer.medium.clone(), from, to });
+            deepest = deepest.max(to);
             // What lies below begins no higher than every layer above can end.
             from = from.max(low / layers.mm_per_unit);
         }
@@ -77,13 +81,15 @@ impl Strata {
             layers: layers.clone(),
             strata,
             finest: 1.0 / most,
+            deep: deepest + 2.0 / medium.sigma_t().max_element(),
         })
     }
 
-    /// The depth of a point of the thing, and the medium that it lies in.
+    /// The depth of a point of the thing, or less where that is far below all layers, and the medium that it lies in.
     pub fn at(&self, thing: &Thing, p: DVec3) -> (f64, &Medium) {
-        let closest =
-            self.nearest.find(self.object_from_world.transform_point3(p)).expect("paths enter what has triangles");
+        let Some(closest) = self.nearest.find(self.object_from_world.transform_point3(p), self.deep) else {
+            return (self.deep, &self.strata[self.strata.len() - 1].medium);
+        };
         let uv = thing.uv(closest.triangle as usize, closest.barycentrics);
         let depth_mm = closest.distance * self.layers.mm_per_unit;
         let layers = &self.layers.list;

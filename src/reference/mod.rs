@@ -62,7 +62,10 @@ pub enum Integrator {
     Volume,
     /// The material's profile says how far it goes: what that model makes when nothing else is approximated.
     Bssrdf,
-    /// It is followed, but only what scatters once between coming in and going out: what `Layered` approximates.
+    /// It is followed, but scatters once only. Of the paths of `Volume` those are left that, between coming in from the open
+    /// and going out, meet one particle at most (or paint within the medium, which stands for one) and are nowhere reflected
+    /// inside: one refraction in, one event, one refraction out. What is reflected outside, and what goes straight through,
+    /// are the picture's other parts as ever. What `Layered` approximates.
     Layered,
 }
 

@@ -87,6 +87,8 @@ pub struct Walk {
     pub weight: Weight,
     /// Of `direction`, where a lamp could have been joined to the path's last vertex instead.
     pub density: Option<f64>,
+    /// How far `origin` lies from that vertex, beyond boundaries that do nothing to the path.
+    pub passed: f64,
     /// Whether what shines along this ray, in the open, was added already.
     pub counted: bool,
     /// Multiplies the light once it has scattered.

@@ -7,11 +7,6 @@
 //! can see them; those without extent also through a smooth refracting boundary ([`super::refracted`]), where no path would
 //! find them.
 //!
-//! Of *single* scattering ([`Tracer::single`]) those paths are left that, between coming into a thing's media from the open
-//! and leaving them, scatter once at most, at a particle or at paint, and are nowhere reflected inside: one refraction in, one
-//! event, one refraction out. Lamps are joined and found as ever. What is reflected outside, and what passes straight
-//! through by one refraction in and one out, are the picture's other parts as ever.
-//!
 //! Radiance is counted per squared index of the medium that it travels in. Lengths are scene units.
 
 use super::boundary::Facing;
@@ -77,7 +72,7 @@ impl Tracer {
         let thing = &self.world.things[point.thing()];
         match &thing.matter {
             Matter::Emitter(_) => {
-                parts.unscattered = self.emitted(point, direction).map_or(Rgb::ZERO, |(light, _)| light)
+                parts.unscattered = self.emitted(point, point.t * direction).map_or(Rgb::ZERO, |(light, _)| light)
             }
             Matter::Translucent { .. } | Matter::Bssrdf { .. } if direction.dot(point.flat) > 0.0 => {
                 // The back of a mesh that is not closed: nothing is entered.
@@ -121,6 +116,7 @@ impl Tracer {
             on,
             inside,
             below: None,
+            passed: 0.0,
             weight: Weight::new(random),
             density: None,
             counted: false,
@@ -146,7 +142,7 @@ impl Tracer {
     /// All light along a ray through nothing, from a surface on: of everything for full light, of lamps and sky for direct.
     fn radiance(&self, p: DVec3, d: DVec3, on: Place, density: Option<f64>, depth: u32, random: &mut Random) -> Rgb {
         let met = self.world.meet(p, d, f64::INFINITY, Some(on));
-        let light = self.shining(p, d, met.as_ref(), density);
+        let light = self.shining(p, d, met.as_ref(), density, 0.0);
         if self.light == Light::Direct || met.is_none() {
             return light;
         }
@@ -157,8 +153,8 @@ impl Tracer {
     }
 
     /// What lamps with extent and the sky send along a ray in empty space, of which a vertex with that density of
-    /// directions takes its share; `met` is what the ray meets first.
-    fn shining(&self, p: DVec3, d: DVec3, met: Option<&Point>, density: Option<f64>) -> Rgb {
+    /// directions takes its share; `met` is what the ray meets first, and `passed` how far behind `p` the vertex lies.
+    fn shining(&self, p: DVec3, d: DVec3, met: Option<&Point>, density: Option<f64>, passed: f64) -> Rgb {
         let density = density.filter(|_| self.joins);
         let share = |own: f64| density.map_or(1.0, |density| density / (density + own));
         let mut sum = Rgb::ZERO;
@@ -172,7 +168,7 @@ impl Tracer {
                 true => met.filter(|point| self.lamp_of[point.thing()] == Some(i)).map(|point| point.t * d),
                 false => lamp.meet(p, d),
             };
-            if let Some((radiance, own)) = seen.and_then(|to| lamp.radiance(to)) {
+            if let Some((radiance, own)) = seen.and_then(|to| lamp.radiance(to + passed * d)) {
                 sum += share(own) * radiance;
             }
         }
@@ -183,9 +179,9 @@ impl Tracer {
         matches!(self.world.things[point.thing()].matter, Matter::Emitter(_))
     }
 
-    fn emitted(&self, point: &Point, d: DVec3) -> Option<(Rgb, f64)> {
+    fn emitted(&self, point: &Point, to: DVec3) -> Option<(Rgb, f64)> {
         let lamp = self.lamp_of[point.thing()]?;
-        self.lamps[lamp].radiance(point.t * d)
+        self.lamps[lamp].radiance(to)
     }
 
     fn facing(&self, thing: &Thing, surface: &Boundary, point: &Point, d: DVec3, inside: Inside) -> Facing {
@@ -214,7 +210,8 @@ impl Tracer {
                 false => self.flight(&walk, met.take(), random),
             };
             if walk.inside.is_nothing() && !std::mem::replace(&mut walk.counted, false) {
-                walk.add(self.shining(walk.origin, walk.direction, flight.end.surface(), walk.density));
+                let met = flight.end.surface();
+                walk.add(self.shining(walk.origin, walk.direction, met, walk.density, walk.passed));
             }
             if walk.depth >= self.max_depth {
                 return walk.sum;
@@ -260,7 +257,7 @@ impl Tracer {
         let parameter = medium.parameter[walk.weight.hero];
         walk.direction = around(from, -medium.phase.sample(random.unit(), parameter), random.unit());
         let values = phase(walk.direction);
-        walk.density = Some(walk.weight.mixed(values));
+        (walk.density, walk.passed) = (Some(walk.weight.mixed(values)), 0.0);
         walk.weight.event(values, values);
     }
 
@@ -326,7 +323,7 @@ impl Tracer {
             // In the open it was counted where the ray was cast.
             Matter::Emitter(_) => {
                 if !walk.inside.is_nothing()
-                    && let Some((radiance, own)) = self.emitted(&point, d)
+                    && let Some((radiance, own)) = self.emitted(&point, (walk.passed + point.t) * d)
                 {
                     let share = walk.density.filter(|_| self.joins).map_or(1.0, |density| density / (density + own));
                     walk.add(share * radiance);
@@ -361,14 +358,16 @@ impl Tracer {
         if facing.eta == 1.0 {
             // Nothing happens to the path, and lamps could be joined through here.
             walk.inside = beyond;
+            walk.passed += point.t;
             if beyond.innermost().is_some() || self.light == Light::Full {
                 return true;
             }
             // Direct light is let in by one thing only.
             let met = self.world.meet(point.p, d, f64::INFINITY, Some(point.place));
-            walk.add(self.shining(point.p, d, met.as_ref(), walk.density));
+            walk.add(self.shining(point.p, d, met.as_ref(), walk.density, walk.passed));
             return false;
         }
+        walk.passed = 0.0;
         let (split, reflected_share, refracted_share) = if facing.is_smooth() {
             let split = facing.split(d);
             (split, split.reflectance, 1.0 - split.reflectance)
@@ -388,7 +387,7 @@ impl Tracer {
             // Both ways: the light outside is looked up, and the path goes on inside.
             let own = density(to);
             let met = self.world.meet(point.p, to, f64::INFINITY, Some(point.place));
-            walk.add(refracted_share * self.shining(point.p, to, met.as_ref(), own));
+            walk.add(refracted_share * self.shining(point.p, to, met.as_ref(), own, 0.0));
             let is_lit = met.is_some_and(|met| !self.is_emitter(&met));
             if is_lit && self.light == Light::Full && random.unit() < 1.0 - split.reflectance {
                 walk.weight.value *= refracted_share / (1.0 - split.reflectance);
@@ -432,7 +431,7 @@ impl Tracer {
         walk.add(bounce.joined);
         walk.weight.value *= bounce.weight;
         (walk.origin, walk.on) = (bounce.p, Some(bounce.place));
-        (walk.direction, walk.density) = (bounce.direction, bounce.density);
+        (walk.direction, walk.density, walk.passed) = (bounce.direction, bounce.density, 0.0);
         walk.weight.value.max_element() > 0.0
     }
 
