@@ -62,6 +62,14 @@ pub const PAPERS: &[Paper] = &[
         "S. Maisch & T. Ropinski. Interactive Subsurface Scattering for Materials With High Scattering Distances. CGF 39(6), 2020",
     ),
     paper("Meisters1975", "G. H. Meisters. Polygons Have Ears. American Mathematical Monthly 82(6), 1975"),
+    paper(
+        "Miller2019",
+        "B. Miller, I. Georgiev & W. Jarosz. A Null-Scattering Path Integral Formulation of Light Transport. ACM TOG 38(4), 2019",
+    ),
+    paper(
+        "Novak2014",
+        "J. Novák, A. Selle & W. Jarosz. Residual Ratio Tracking for Estimating Attenuation in Participating Media. ACM TOG 33(6), 2014",
+    ),
     paper("OpenPBR2024", "Academy Software Foundation. OpenPBR Surface 1.1, 2024"),
     paper("Ottosson2020", "B. Ottosson. A Perceptual Color Space for Image Processing. 2020"),
     paper("Patro2007", "R. Patro. Real-Time Approximate Subsurface Scattering. 2007"),

@@ -53,7 +53,8 @@ struct Trace {
     output: Option<PathBuf>,
     #[command(flatten)]
     look: LookFlags,
-    /// volume (random walks through the media), or bssrdf (each material's profile, with nothing else approximated)
+    /// volume (random walks through the media and their layers), layered (the same, scattered only once between coming in
+    /// and going out), or bssrdf (each material's profile, with nothing else approximated)
     #[arg(long, value_enum, default_value = "volume")]
     integrator: Integrator,
     /// full, or direct: light source, object, eye
@@ -129,10 +130,7 @@ impl Trace {
         let (integrator, name) = match self.integrator {
             Integrator::Volume => (reference::Integrator::Volume, "volume"),
             Integrator::Bssrdf => (reference::Integrator::Bssrdf, "bssrdf"),
-            Integrator::Layered => {
-                let hint = "volume, or bssrdf: both see the innermost medium only";
-                return Err(words("--integrator: `layered` is not in this version", hint).into());
-            }
+            Integrator::Layered => (reference::Integrator::Layered, "layered"),
         };
         let positive = |flag: &str, value: Option<f64>| match value {
             Some(value) if !(value.is_finite() && value > 0.0) => {

@@ -6,6 +6,7 @@
 pub mod bvh;
 pub mod deform;
 pub mod mesh;
+pub mod nearest;
 pub mod neighbours;
 pub mod normals;
 pub mod obj;

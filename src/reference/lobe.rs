@@ -7,6 +7,7 @@
 
 use super::boundary::Facing;
 use super::light::{Lamp, Ray};
+use super::path::Walk;
 use super::random::Random;
 use super::volume::Tracer;
 use super::world::{Boundary, Matter, Point, Thing};
@@ -28,7 +29,7 @@ const SURE: f64 = 3.0;
 
 impl Lobe {
     /// Of a lamp without extent, from `p` inside `thing`; none where the guess finds nothing.
-    pub fn new(tracer: &Tracer, lamp: &Lamp, thing: usize, p: DVec3, sigma_t: Rgb) -> Option<Lobe> {
+    pub fn new(tracer: &Tracer, lamp: &Lamp, thing: usize, p: DVec3) -> Option<Lobe> {
         let body = &tracer.world.things[thing];
         let surface = rough(body)?;
         let mut to = lamp.ray(p)?.direction;
@@ -42,8 +43,8 @@ impl Lobe {
             guess = Some((facing, travels, point.t));
         }
         let (facing, travels, t) = guess?;
-        let lies = (SURE - sigma_t.min_element() * t).min(0.0).exp();
-        (travels.dot(facing.normal) < 0.0 && !facing.is_smooth()).then_some(Lobe { facing, travels, chance: lies })
+        let chance = (SURE - tracer.world.fill(thing).thinnest() * t).min(0.0).exp();
+        (travels.dot(facing.normal) < 0.0 && !facing.is_smooth()).then_some(Lobe { facing, travels, chance })
     }
 
     /// A direction from the point, by chance.
@@ -78,18 +79,18 @@ fn outside(thing: &Thing, surface: &Boundary, point: &Point) -> Facing {
 }
 
 impl Tracer {
-    /// A lamp without extent, through the rough boundary of the thing in which `p` lies: a direction from there, and
+    /// A lamp without extent, through the rough boundary of the thing in which a path lies: a direction from there, and
     /// irradiance on a particle, over its density. `own` is the density with which the path would have gone there itself.
     pub(super) fn through_rough(
         &self,
+        walk: &Walk,
         lamp: &Lamp,
         thing: usize,
-        p: DVec3,
-        sigma_t: Rgb,
         own: impl Fn(DVec3) -> f64,
         random: &mut Random,
     ) -> Option<(DVec3, Rgb)> {
-        let lobe = Lobe::new(self, lamp, thing, p, sigma_t)?;
+        let p = walk.origin;
+        let lobe = Lobe::new(self, lamp, thing, p)?;
         let to = lobe.sample(random)?;
         let density = lobe.density(to);
         let point = self.world.meet(p, to, f64::INFINITY, None).filter(|point| point.thing() == thing)?;
@@ -107,7 +108,7 @@ impl Tracer {
         if value == 0.0 || lamp.shadow && !self.reaches(point.p, &ray, Some(point.place)) {
             return None;
         }
-        let through = (-sigma_t * point.t).exp();
+        let through = self.world.fill(thing).transmittance(p, walk.below, to, point.t, random);
         Some((to, value * through * ray.irradiance / (density + own(to))))
     }
 }

@@ -3,7 +3,9 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | [`volume`] | the first integrator: unbiased random walks through the media |
+//! | [`volume`] | the first integrator: unbiased random walks through the media; and the third: single scattering |
+//! | [`free_path`] | how far paths and light get in a medium, homogeneous or in layers |
+//! | [`layers`] | which medium a point lies in |
 //! | [`bssrdf`] | the second: the diffusion profile of each material, where light enters and where it leaves |
 //! | [`surfaces`] | what surfaces do that paths do not enter |
 //! | [`boundary`] | reflection and refraction, smooth and rough |
@@ -22,6 +24,8 @@
 pub mod boundary;
 pub mod bssrdf;
 pub mod film;
+pub mod free_path;
+pub mod layers;
 pub mod light;
 pub mod lobe;
 pub mod path;
@@ -33,13 +37,15 @@ pub mod world;
 
 use crate::geometry::mesh::Mesh;
 use crate::image::{Image, Texture};
+use crate::optics::phase::Phase;
 use crate::optics::{Rgb, medium};
 use crate::problem::Problem;
-use crate::scene::{Camera, LightKind, Object, Part, Scene, Sky, Substance, shape};
+use crate::scene::{self, Camera, LightKind, Object, Part, Scene, Sky, Substance, shape};
 use crate::store::{Bake, Key, Plan, Run, Slot, Step};
 use bssrdf::Bssrdf;
 use film::{Film, Level, Moments};
 use glam::{DAffine3, DVec3};
+use layers::{Layer, Layers};
 use light::{Kind, Lamp, SkyImage};
 use path::Inside;
 use random::Random;
@@ -58,6 +64,11 @@ pub enum Integrator {
     Volume,
     /// The material's profile says how far it goes: what that model makes when nothing else is approximated.
     Bssrdf,
+    /// It is followed, but scatters once only. Of the paths of `Volume` those are left that, between coming in from the open
+    /// and going out, meet one particle at most (or paint within the medium, which stands for one) and are nowhere reflected
+    /// inside: one refraction in, one event, one refraction out. What is reflected outside, and what goes straight through,
+    /// are the picture's other parts as ever. What `Layered` approximates.
+    Layered,
 }
 
 /// Which picture, and how far to go.
@@ -138,7 +149,8 @@ fn tracer(plan: &mut Plan, scene: &Scene, settings: &Settings) -> Slot<Tracer> {
         };
         lamps.push(Lamp { kind, shadow: light.shadow });
     }
-    plan.add(BuildTracer { things, lamps, sky, light: settings.light, max_depth: settings.max_depth })
+    let single = settings.integrator == Integrator::Layered;
+    plan.add(BuildTracer { things, lamps, sky, light: settings.light, max_depth: settings.max_depth, single })
 }
 
 /// What an object is made of, with coefficients per scene unit.
@@ -153,18 +165,32 @@ fn matter(object: &Object, mm_per_unit: f64, integrator: Integrator) -> Matter {
         Substance::Opaque { albedo } => return Matter::Opaque { surface, albedo: *albedo },
         Substance::Translucent(medium) => medium,
     };
-    let (sigma_a, sigma_s) = (medium.sigma_a * mm_per_unit, medium.sigma_s * mm_per_unit);
     match integrator {
-        Integrator::Volume => {
-            let parameter = Rgb::from_array(medium.g.to_array().map(|g| material.phase.parameter(g)));
-            let medium = Medium { sigma_a, sigma_s, phase: material.phase, parameter };
-            Matter::Translucent { surface, medium }
+        Integrator::Volume | Integrator::Layered => {
+            let layer = |layer: &scene::Layer| Layer {
+                medium: followed(&layer.medium, layer.phase, mm_per_unit),
+                depth: layer.depth.clone(),
+            };
+            let list: Vec<Layer> = material.layers.iter().map(layer).collect();
+            let layers = (!list.is_empty()).then_some(Layers { list, mm_per_unit });
+            Matter::Translucent { surface, medium: followed(medium, material.phase, mm_per_unit), layers }
         }
         Integrator::Bssrdf => {
+            let (sigma_a, sigma_s) = (medium.sigma_a * mm_per_unit, medium.sigma_s * mm_per_unit);
             let medium = medium::Medium { sigma_a, sigma_s, g: medium.g };
             let bssrdf = Bssrdf::new(material.profile, medium, material.phase, surface.ior);
             Matter::Bssrdf { surface, bssrdf: Box::new(bssrdf) }
         }
+    }
+}
+
+/// A medium as paths go through it.
+fn followed(medium: &medium::Medium, phase: Phase, mm_per_unit: f64) -> Medium {
+    Medium {
+        sigma_a: medium.sigma_a * mm_per_unit,
+        sigma_s: medium.sigma_s * mm_per_unit,
+        phase,
+        parameter: Rgb::from_array(medium.g.to_array().map(|g| phase.parameter(g))),
     }
 }
 
@@ -192,6 +218,7 @@ struct BuildTracer {
     sky: Option<SkyText>,
     light: Light,
     max_depth: u32,
+    single: bool,
 }
 
 impl Step for BuildTracer {
@@ -237,7 +264,8 @@ impl Step for BuildTracer {
             shadow: sky.shadow,
         });
         let lamps = self.lamps.clone();
-        Ok(Tracer { world, lamps, sky, lamp_of, refracted, light: self.light, max_depth: self.max_depth, joins: true })
+        let BuildTracer { light, max_depth, single, .. } = *self;
+        Ok(Tracer { world, lamps, sky, lamp_of, refracted, light, max_depth, single, joins: true })
     }
 }
 

@@ -87,9 +87,13 @@ pub struct Walk {
     pub direction: DVec3,
     pub on: Option<Place>,
     pub inside: Inside,
+    /// How deep `origin` lies in the innermost thing, where that is known.
+    pub below: Option<f64>,
     pub weight: Weight,
     /// Of `direction`, where a lamp could have been joined to the path's last vertex instead.
     pub density: Option<f64>,
+    /// How far `origin` lies from that vertex, beyond boundaries that do nothing to the path.
+    pub passed: f64,
     /// Whether what shines along this ray, in the open, was added already.
     pub counted: bool,
     /// The thing in which the path was scattered last and where, as long as it has not met a surface since: there lamps
@@ -98,6 +102,8 @@ pub struct Walk {
     /// Multiplies the light once it has scattered.
     pub color: Rgb,
     pub scattered: bool,
+    /// Whether it has scattered since it came from the open.
+    pub struck: bool,
     pub depth: u32,
     pub sum: Sum,
 }

@@ -11,7 +11,6 @@
 
 use super::boundary::Facing;
 use super::light::Kind;
-use super::random::Random;
 use super::world::{Boundary, Matter, Place, Thing, World};
 use crate::optics::Rgb;
 use glam::{DVec2, DVec3, Vec3A};
@@ -60,7 +59,7 @@ const PIECES: usize = 64;
 impl Refracted {
     /// None where no light is refracted by a smooth boundary: an index of 1, a rough one ([`super::lobe`]), a lamp with extent.
     pub fn new(world: &World, lamp: usize, kind: &Kind, thing: usize) -> Option<Refracted> {
-        let Matter::Translucent { surface, medium } = &world.things[thing].matter else { return None };
+        let Matter::Translucent { surface, .. } = &world.things[thing].matter else { return None };
         if surface.ior == 1.0 || matches!(kind, Kind::Rect { .. }) || !is_smooth(surface) {
             return None;
         }
@@ -79,7 +78,7 @@ impl Refracted {
         // Every point inside lies within the thing's own box, so no beam need be longer than its diagonal.
         let bounds = body.mesh.bounds();
         let diagonal = bounds.diagonal();
-        let sigma = medium.sigma_t().min_element();
+        let sigma = world.fill(thing).thinnest();
         let reach = if sigma > 0.0 { diagonal.min(FAINTEST / sigma) } else { diagonal };
         let (center, scale) = (0.5 * (min + max), (max - min).max_element().max(f64::MIN_POSITIVE));
         let boxed: Vec<Vec<(Aabb, f64)>> =
@@ -93,18 +92,18 @@ impl Refracted {
 
     /// Calls `found` for directions from `p`, inside the thing, in which the boundary shows the lamp: the direction
     /// towards it, and irradiance on a particle there, per squared index. What is far below the boundary finds it the more
-    /// rarely the fainter it is, and then as much brighter.
+    /// rarely the fainter it is, and then as much brighter: `luck`, exponentially distributed with mean 1, says whether,
+    /// `sigma` being the least extinction. `through` is the share of light that a direction and a length leave.
     pub fn each(
         &self,
         world: &World,
         p: DVec3,
-        sigma_t: Rgb,
         shadow: bool,
-        random: &mut Random,
+        (sigma, luck): (f64, f64),
+        mut through: impl FnMut(DVec3, f64) -> Rgb,
         mut found: impl FnMut(DVec3, Rgb),
     ) {
-        let sigma = sigma_t.min_element();
-        let reach = if sigma > 0.0 { (SURE + random.exponential()) / sigma } else { f64::INFINITY };
+        let reach = if sigma > 0.0 { (SURE + luck) / sigma } else { f64::INFINITY };
         let local = ((p - self.center) / self.scale).as_vec3a();
         // The pieces of one triangle overlap: each triangle counts once.
         let mut seen: [u32; 256] = [u32::MAX; 256];
@@ -137,7 +136,7 @@ impl Refracted {
             if length > reach {
                 continue;
             }
-            if let Some((direction, light)) = self.light(world, triangle, at, p, sigma_t, shadow) {
+            if let Some((direction, light)) = self.light(world, triangle, at, p, shadow, &mut through) {
                 found(direction, light * (sigma * length - SURE).max(0.0).exp());
             }
         }
@@ -149,8 +148,8 @@ impl Refracted {
         triangle: &Triangle,
         at: DVec2,
         p: DVec3,
-        sigma_t: Rgb,
         shadow: bool,
+        through: &mut impl FnMut(DVec3, f64) -> Rgb,
     ) -> Option<(DVec3, Rgb)> {
         let q = triangle.point(at);
         let (to, length) = ((q - p).normalize(), (q - p).length());
@@ -174,7 +173,7 @@ impl Refracted {
             Kind::Rect { .. } => unreachable!("a lamp with extent is found by paths"),
         };
         let spread = self.spread(triangle, p, to, length)?;
-        let through = (1.0 - split.reflectance) * (-sigma_t * length).exp();
+        let through = (1.0 - split.reflectance) * through(to, length);
         Some((to, through * power / spread))
     }
 

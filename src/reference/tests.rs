@@ -4,7 +4,6 @@ use super::*;
 use crate::geometry::shapes;
 use crate::optics::fresnel::{fresnel_dielectric, refracted_cosine};
 use crate::optics::half_space::HalfSpace;
-use crate::optics::phase::Phase;
 use crate::scene::Varying;
 use glam::DMat3;
 use std::f64::consts::PI;
@@ -16,7 +15,7 @@ fn surface(ior: f64, roughness: f64) -> Boundary {
 
 fn translucent(ior: f64, roughness: f64, sigma_a: Rgb, sigma_s: Rgb, g: f64) -> Matter {
     let medium = Medium { sigma_a, sigma_s, phase: Phase::HenyeyGreenstein, parameter: Rgb::splat(g) };
-    Matter::Translucent { surface: surface(ior, roughness), medium }
+    Matter::Translucent { surface: surface(ior, roughness), medium, layers: None }
 }
 
 fn tracer(things: Vec<(Mesh, Matter)>, lamps: Vec<Lamp>, sky: Option<f64>, light: Light, max_depth: u32) -> Tracer {
@@ -39,7 +38,7 @@ fn tracer(things: Vec<(Mesh, Matter)>, lamps: Vec<Lamp>, sky: Option<f64>, light
         .map(|thing| if let Matter::Emitter(lamp) = thing.matter { Some(lamp) } else { None })
         .collect();
     let sky = sky.map(|radiance| light::Sky { scale: Rgb::splat(radiance), image: None, shadow: true });
-    Tracer { world, lamps, sky, lamp_of, refracted, light, max_depth, joins: true }
+    Tracer { world, lamps, sky, lamp_of, refracted, light, max_depth, single: false, joins: true }
 }
 
 fn sun(direction: DVec3) -> Lamp {
@@ -265,3 +264,5 @@ fn nothing_is_lost_between_white_surfaces() {
 }
 
 mod bssrdf;
+mod layers;
+mod single;

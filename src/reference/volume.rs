@@ -1,14 +1,16 @@
-//! The volumetric truth: unbiased random walks through homogeneous media inside any closed mesh, in f64.
+//! The volumetric truth: unbiased random walks through the media inside any closed mesh, in f64.
 //!
-//! A path starts at the eye. Free paths are exponential, directions follow the phase function, boundaries reflect and
-//! refract by Fresnel or by GGX microfacets; nothing is approximated. One path serves three channels: its free paths are
-//! drawn for one of them, and its weight is the balance heuristic over all three (spectral multiple importance sampling
-//! [Wilkie2014]), so that no channel's weight exceeds 3. Lamps are joined to each vertex that can see them; those
-//! without extent also through a refracting boundary ([`super::refracted`], [`super::lobe`]), where few paths or none would find them.
+//! A path starts at the eye. Free paths are as the medium has them ([`super::free_path`]), directions follow the phase
+//! function, boundaries reflect and refract by Fresnel or by GGX microfacets; nothing is approximated. One path serves three
+//! channels: its free paths are drawn for one of them, and its weight is the balance heuristic over all three (spectral
+//! multiple importance sampling [Wilkie2014]), so that no channel's weight exceeds 3. Lamps are joined to each vertex that
+//! can see them; those without extent also through a refracting boundary ([`super::refracted`], [`super::lobe`]), where few
+//! paths or none would find them.
 //!
 //! Radiance is counted per squared index of the medium that it travels in. Lengths are scene units.
 
 use super::boundary::Facing;
+use super::free_path::End;
 use super::light::{Kind, Lamp, Ray, Sky};
 use super::lobe::Lobe;
 use super::path::{Inside, Parts, Sum, Walk, Weight};
@@ -41,6 +43,8 @@ pub struct Tracer {
     pub refracted: Vec<Refracted>,
     pub light: Light,
     pub max_depth: u32,
+    /// Whether light scatters only once in what it enters.
+    pub single: bool,
     /// Whether lamps with extent and the sky are joined to vertices. Without, paths must find them by themselves: the same
     /// picture, with more noise.
     pub joins: bool,
@@ -69,7 +73,7 @@ impl Tracer {
         let thing = &self.world.things[point.thing()];
         match &thing.matter {
             Matter::Emitter(_) => {
-                parts.unscattered = self.emitted(point, direction).map_or(Rgb::ZERO, |(light, _)| light)
+                parts.unscattered = self.emitted(point, point.t * direction).map_or(Rgb::ZERO, |(light, _)| light)
             }
             Matter::Translucent { .. } | Matter::Bssrdf { .. } if direction.dot(point.flat) > 0.0 => {
                 // The back of a mesh that is not closed: nothing is entered.
@@ -112,12 +116,15 @@ impl Tracer {
             direction,
             on,
             inside,
+            below: None,
+            passed: 0.0,
             weight: Weight::new(random),
             density: None,
             counted: false,
             lobes: None,
             color: Rgb::ONE,
             scattered: false,
+            struck: false,
             depth: 0,
             sum: Sum::default(),
         }
@@ -137,7 +144,7 @@ impl Tracer {
     /// All light along a ray through nothing, from a surface on: of everything for full light, of lamps and sky for direct.
     fn radiance(&self, p: DVec3, d: DVec3, on: Place, density: Option<f64>, depth: u32, random: &mut Random) -> Rgb {
         let met = self.world.meet(p, d, f64::INFINITY, Some(on));
-        let light = self.shining(p, d, met.as_ref(), density);
+        let light = self.shining(p, d, met.as_ref(), density, 0.0);
         if self.light == Light::Direct || met.is_none() {
             return light;
         }
@@ -148,8 +155,8 @@ impl Tracer {
     }
 
     /// What lamps with extent and the sky send along a ray in empty space, of which a vertex with that density of
-    /// directions takes its share; `met` is what the ray meets first.
-    fn shining(&self, p: DVec3, d: DVec3, met: Option<&Point>, density: Option<f64>) -> Rgb {
+    /// directions takes its share; `met` is what the ray meets first, and `passed` how far behind `p` the vertex lies.
+    fn shining(&self, p: DVec3, d: DVec3, met: Option<&Point>, density: Option<f64>, passed: f64) -> Rgb {
         let density = density.filter(|_| self.joins);
         let share = |own: f64| density.map_or(1.0, |density| density / (density + own));
         let mut sum = Rgb::ZERO;
@@ -163,31 +170,20 @@ impl Tracer {
                 true => met.filter(|point| self.lamp_of[point.thing()] == Some(i)).map(|point| point.t * d),
                 false => lamp.meet(p, d),
             };
-            if let Some((radiance, own)) = seen.and_then(|to| lamp.radiance(to)) {
+            if let Some((radiance, own)) = seen.and_then(|to| lamp.radiance(to + passed * d)) {
                 sum += share(own) * radiance;
             }
         }
         sum
     }
 
-    fn medium(&self, inside: Inside) -> Option<&Medium> {
-        inside.innermost().map(|i| match &self.world.things[i].matter {
-            Matter::Translucent { medium, .. } => medium,
-            _ => unreachable!("paths enter only what is translucent"),
-        })
-    }
-
-    fn sigma_t(&self, inside: Inside) -> Rgb {
-        self.medium(inside).map_or(Rgb::ZERO, Medium::sigma_t)
-    }
-
     fn is_emitter(&self, point: &Point) -> bool {
         matches!(self.world.things[point.thing()].matter, Matter::Emitter(_))
     }
 
-    fn emitted(&self, point: &Point, d: DVec3) -> Option<(Rgb, f64)> {
+    fn emitted(&self, point: &Point, to: DVec3) -> Option<(Rgb, f64)> {
         let lamp = self.lamp_of[point.thing()]?;
-        self.lamps[lamp].radiance(point.t * d)
+        self.lamps[lamp].radiance(to)
     }
 
     fn facing(&self, thing: &Thing, surface: &Boundary, point: &Point, d: DVec3, inside: Inside) -> Facing {
@@ -211,37 +207,32 @@ impl Tracer {
     /// Follows a path to its end. `met` is what its ray meets first, if that is known already.
     fn walk_from(&self, mut walk: Walk, mut met: Option<Point>, random: &mut Random) -> Sum {
         loop {
-            let medium = self.medium(walk.inside);
-            let sigma_t = medium.map_or(Rgb::ZERO, Medium::sigma_t);
-            let free = match sigma_t[walk.weight.hero] {
-                0.0 => f64::INFINITY,
-                sigma => random.exponential() / sigma,
+            let flight = match self.single && walk.struck {
+                true => self.passage(&walk, random),
+                false => self.flight(&walk, met.take(), random),
             };
-            let point = met.take().or_else(|| self.world.meet(walk.origin, walk.direction, free, walk.on));
-            if medium.is_none() && !std::mem::replace(&mut walk.counted, false) {
-                walk.add(self.shining(walk.origin, walk.direction, point.as_ref(), walk.density));
+            if walk.inside.is_nothing() && !std::mem::replace(&mut walk.counted, false) {
+                let met = flight.end.surface();
+                walk.add(self.shining(walk.origin, walk.direction, met, walk.density, walk.passed));
             }
             if walk.depth >= self.max_depth {
                 return walk.sum;
             }
             walk.depth += 1;
-            match (point, medium) {
-                (Some(point), _) => {
-                    let through = (-sigma_t * point.t).exp();
-                    walk.weight.event(through, through);
+            walk.weight = flight.weight;
+            match flight.end {
+                End::Surface(point) => {
+                    walk.below = None;
                     if !self.cross(&mut walk, point, random) {
                         return walk.sum;
                     }
+                    walk.struck &= !walk.inside.is_nothing();
                 }
-                (None, Some(medium)) if free.is_finite() => {
-                    let through = (-sigma_t * free).exp();
-                    walk.weight.event(medium.sigma_s * through, sigma_t * through);
-                    walk.origin += free * walk.direction;
-                    walk.on = None;
+                End::Particle(p, medium, below) => {
+                    (walk.origin, walk.on, walk.below) = (p, None, below);
                     self.scatter(&mut walk, medium, random);
                 }
-                // Away; or out of a mesh that is not closed, where nobody can tell what light would come.
-                (None, _) => return walk.sum,
+                End::Away => return walk.sum,
             }
             // Roulette by weight: what is left of the light decides, so that high albedos live long.
             let left = walk.weight.value.max_element();
@@ -256,7 +247,7 @@ impl Tracer {
 
     /// A path meets a medium's particle: light that is scattered there, and the way on.
     fn scatter(&self, walk: &mut Walk, medium: &Medium, random: &mut Random) {
-        walk.scattered = true;
+        (walk.scattered, walk.struck) = (true, true);
         let from = walk.direction;
         // Channels may scatter differently: the direction is drawn for the hero, and weighs like a free path.
         let phase =
@@ -264,13 +255,12 @@ impl Tracer {
         self.join_lamps(walk, |lamp| self.is_joined(lamp), phase, random);
         let refracts = walk.inside.only().is_some_and(|thing| self.world.things[thing].refracts());
         if let Some((ray, shadow)) = self.sky_sample(random).filter(|_| !refracts) {
-            self.join(walk, &ray, shadow, phase(ray.direction));
+            self.join(walk, &ray, shadow, phase(ray.direction), random);
         }
         if let Some(thing) = walk.inside.only() {
             let own = |to| walk.weight.mixed(phase(to));
             for lamp in self.lamps.iter().filter(|lamp| !lamp.has_extent()) {
-                let sigma_t = medium.sigma_t();
-                if let Some((to, light)) = self.through_rough(lamp, thing, walk.origin, sigma_t, own, random) {
+                if let Some((to, light)) = self.through_rough(walk, lamp, thing, own, random) {
                     walk.sum.scattered += walk.color * walk.weight.value * phase(to) * light;
                 }
             }
@@ -279,7 +269,7 @@ impl Tracer {
         let parameter = medium.parameter[walk.weight.hero];
         walk.direction = around(from, -medium.phase.sample(random.unit(), parameter), random.unit());
         let values = phase(walk.direction);
-        walk.density = Some(walk.weight.mixed(values));
+        (walk.density, walk.passed) = (Some(walk.weight.mixed(values)), 0.0);
         walk.weight.event(values, values);
     }
 
@@ -292,18 +282,20 @@ impl Tracer {
         random: &mut Random,
     ) {
         let innermost = walk.inside.innermost();
+        let (p, below, fill) = (walk.origin, walk.below, self.fill(walk.inside));
         for (i, lamp) in self.lamps.iter().enumerate().filter(|(_, lamp)| wanted(lamp)) {
             for refracted in self.refracted.iter().filter(|r| r.lamp == i && Some(r.thing) == innermost) {
-                let sigma_t = self.sigma_t(walk.inside);
-                refracted.each(&self.world, walk.origin, sigma_t, lamp.shadow, random, |to, light| {
+                let luck = random.exponential();
+                let through = |to, length| fill.transmittance(p, below, to, length, random);
+                refracted.each(&self.world, p, lamp.shadow, (fill.thinnest(), luck), through, |to, light| {
                     walk.sum.scattered += walk.color * walk.weight.value * phase(to) * light;
                 });
             }
             if walk.inside.only().is_some_and(|thing| self.is_behind_glass(lamp, thing)) {
                 continue;
             }
-            if let Some(ray) = lamp.sample(walk.origin, random) {
-                self.join(walk, &ray, lamp.shadow, phase(ray.direction));
+            if let Some(ray) = lamp.sample(p, random) {
+                self.join(walk, &ray, lamp.shadow, phase(ray.direction), random);
             }
         }
     }
@@ -320,26 +312,27 @@ impl Tracer {
     }
 
     /// Adds a lamp's light at a vertex in a medium, straight through boundaries that do not refract.
-    fn join(&self, walk: &mut Walk, ray: &Ray, shadow: bool, phase: Rgb) {
+    fn join(&self, walk: &mut Walk, ray: &Ray, shadow: bool, phase: Rgb, random: &mut Random) {
         let (mut p, mut on, mut inside, mut left) = (walk.origin, walk.on, walk.inside, ray.distance);
-        let mut through = Rgb::ONE;
+        let (mut through, mut below) = (Rgb::ONE, walk.below);
         let mut is_out = false;
         loop {
             let met = self.world.meet(p, ray.direction, left * (1.0 - 1e-9), on);
-            if !inside.is_nothing() {
-                let length = met.as_ref().map_or(left, |point| point.t);
-                through *= (-self.sigma_t(inside) * length).exp();
-            }
-            let Some(point) = met else { break };
-            if is_out && !shadow {
+            if is_out && (met.is_none() || !shadow) {
                 break;
             }
-            let Matter::Translucent { surface, .. } = &self.world.things[point.thing()].matter else { return };
-            let leaves = ray.direction.dot(point.flat) > 0.0;
-            // Direct light is let in by the thing that it is scattered in, and by no other.
-            if surface.ior != 1.0 || self.light == Light::Direct && (is_out || !leaves) {
-                return;
+            if let Some(point) = &met {
+                let Matter::Translucent { surface, .. } = &self.world.things[point.thing()].matter else { return };
+                // Direct light is let in by the thing that it is scattered in, and by no other.
+                let is_elsewhere = self.light == Light::Direct && (is_out || ray.direction.dot(point.flat) <= 0.0);
+                if surface.ior != 1.0 || is_elsewhere {
+                    return;
+                }
             }
+            let length = met.as_ref().map_or(left, |point| point.t);
+            through *= self.fill(inside).transmittance(p, below.take(), ray.direction, length, random);
+            let Some(point) = met else { break };
+            let leaves = ray.direction.dot(point.flat) > 0.0;
             inside = if leaves { inside.without(point.thing()) } else { inside.with(point.thing()) };
             is_out = inside.innermost().is_none();
             (p, on, left) = (point.p, Some(point.place), left - point.t);
@@ -357,7 +350,7 @@ impl Tracer {
             // In the open it was counted where the ray was cast.
             Matter::Emitter(_) => {
                 if !walk.inside.is_nothing()
-                    && let Some((radiance, own)) = self.emitted(&point, d)
+                    && let Some((radiance, own)) = self.emitted(&point, (walk.passed + point.t) * d)
                 {
                     let share = walk.density.filter(|_| self.joins).map_or(1.0, |density| density / (density + own));
                     walk.add(share * radiance);
@@ -370,7 +363,10 @@ impl Tracer {
             }
             Matter::Opaque { surface, albedo } => {
                 // An opaque thing within a medium: white paint whose boundary the medium wets.
-                walk.scattered = true;
+                if self.single && walk.struck {
+                    return false;
+                }
+                (walk.scattered, walk.struck) = (true, true);
                 let normal = if d.dot(point.normal) < 0.0 { point.normal } else { -point.normal };
                 let (u, v) = random.pair();
                 walk.weight.value *= *albedo * thing.color(surface, &point);
@@ -390,14 +386,16 @@ impl Tracer {
             walk.lobes = None;
             // Nothing happens to the path, and lamps could be joined through here.
             walk.inside = beyond;
+            walk.passed += point.t;
             if beyond.innermost().is_some() || self.light == Light::Full {
                 return true;
             }
             // Direct light is let in by one thing only.
             let met = self.world.meet(point.p, d, f64::INFINITY, Some(point.place));
-            walk.add(self.shining(point.p, d, met.as_ref(), walk.density));
+            walk.add(self.shining(point.p, d, met.as_ref(), walk.density, walk.passed));
             return false;
         }
+        walk.passed = 0.0;
         let (split, reflected_share, refracted_share) = if facing.is_smooth() {
             let split = facing.split(d);
             (split, split.reflectance, 1.0 - split.reflectance)
@@ -418,7 +416,7 @@ impl Tracer {
             // Both ways: the light outside is looked up, and the path goes on inside.
             let own = density(to);
             let met = self.world.meet(point.p, to, f64::INFINITY, Some(point.place));
-            walk.add(refracted_share * self.shining(point.p, to, met.as_ref(), own));
+            walk.add(refracted_share * self.shining(point.p, to, met.as_ref(), own, 0.0));
             let is_lit = met.is_some_and(|met| !self.is_emitter(&met));
             if is_lit && self.light == Light::Full && random.unit() < 1.0 - split.reflectance {
                 walk.weight.value *= refracted_share / (1.0 - split.reflectance);
@@ -429,13 +427,16 @@ impl Tracer {
             let chosen = is_lit && self.light == Light::Full;
             walk.weight.value *= if chosen { reflected_share / split.reflectance } else { reflected_share };
             (walk.direction, walk.density) = (split.reflected, None);
-            return reflected_share > 0.0;
+            return reflected_share > 0.0 && !self.single;
         }
         let goes_in = out.is_some() && random.unit() >= split.reflectance;
         if goes_in {
             walk.weight.value *= refracted_share / (1.0 - split.reflectance);
             (walk.direction, walk.inside) = (out.expect("it goes in"), beyond);
         } else {
+            if self.single && !walk.inside.is_nothing() {
+                return false;
+            }
             // Where nothing can be refracted this is certain, and else chosen with the reflectance.
             let chance = if out.is_some() { split.reflectance } else { 1.0 };
             walk.weight.value *= reflected_share / chance;
@@ -459,7 +460,7 @@ impl Tracer {
         walk.add(bounce.joined);
         walk.weight.value *= bounce.weight;
         (walk.origin, walk.on) = (bounce.p, Some(bounce.place));
-        (walk.direction, walk.density) = (bounce.direction, bounce.density);
+        (walk.direction, walk.density, walk.passed) = (bounce.direction, bounce.density, 0.0);
         walk.weight.value.max_element() > 0.0
     }
 
@@ -469,7 +470,7 @@ impl Tracer {
         // Lamps that were joined to the path's last vertex through here have their share already.
         let joined = |lamp: Option<&Lamp>, own: f64| {
             let (thing, p) = walk.lobes.filter(|(thing, _)| *thing == point.thing())?;
-            Some(Lobe::new(self, lamp?, thing, p, self.sigma_t(walk.inside))?.density(d) / own)
+            Some(Lobe::new(self, lamp?, thing, p)?.density(d) / own)
         };
         let light = self.joined(point, random, |lamp, ray| match ray.direction.dot(point.flat) > 0.0 {
             true => {

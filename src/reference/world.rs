@@ -1,6 +1,7 @@
 //! The scene as rays see it: every triangle of every visible object and area light in world space.
 
 use super::bssrdf::Bssrdf;
+use super::layers::{Layers, Strata};
 use crate::geometry::bvh::{Bvh, Hit};
 use crate::geometry::mesh::Mesh;
 use crate::optics::Rgb;
@@ -14,19 +15,15 @@ use std::sync::Arc;
 #[derive(Clone, Debug, Serialize)]
 pub enum Matter {
     /// Lambertian under a dielectric boundary.
-    Opaque {
-        surface: Boundary,
-        albedo: Rgb,
-    },
+    Opaque { surface: Boundary, albedo: Rgb },
     Translucent {
         surface: Boundary,
         medium: Medium,
+        /// Over the medium; none where it fills all of the thing.
+        layers: Option<Layers>,
     },
     /// The same, but light is not followed through it.
-    Bssrdf {
-        surface: Boundary,
-        bssrdf: Box<Bssrdf>,
-    },
+    Bssrdf { surface: Boundary, bssrdf: Box<Bssrdf> },
     /// An area light: its place in the scene's list.
     Emitter(usize),
 }
@@ -66,6 +63,8 @@ pub struct World {
     pub things: Vec<Thing>,
     /// Around each thing.
     pub balls: Vec<Ball>,
+    /// The layers of each thing that has some, in space.
+    pub strata: Vec<Option<Strata>>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -101,7 +100,8 @@ impl World {
     pub fn new(things: Vec<Thing>) -> World {
         let meshes: Vec<(&Mesh, DAffine3)> =
             things.iter().map(|thing| (thing.mesh.as_ref(), thing.world_from_object)).collect();
-        World { bvh: Bvh::new(&meshes), balls: things.iter().map(Thing::ball).collect(), things }
+        let strata = things.iter().map(Strata::of).collect();
+        World { bvh: Bvh::new(&meshes), balls: things.iter().map(Thing::ball).collect(), strata, things }
     }
 
     /// What a ray meets first within `t_max`, on either side; never the triangle `from` that it starts on.
@@ -164,12 +164,11 @@ impl Thing {
     }
 
     /// Texture coordinates; v runs upwards.
-    fn uv(&self, point: &Point) -> (f64, f64) {
+    pub fn uv(&self, triangle: usize, b: glam::DVec2) -> (f64, f64) {
         if self.mesh.uvs.is_empty() {
             return (0.0, 0.0);
         }
-        let [i, j, k] = self.mesh.triangles[point.place.1 as usize].map(|v| self.mesh.uvs[v as usize].as_dvec2());
-        let b = point.barycentrics;
+        let [i, j, k] = self.mesh.triangles[triangle].map(|v| self.mesh.uvs[v as usize].as_dvec2());
         let uv = (1.0 - b.x - b.y) * i + b.x * j + b.y * k;
         (uv.x, uv.y)
     }
@@ -178,17 +177,22 @@ impl Thing {
         match &surface.color {
             Varying::Constant(color) => *color,
             Varying::Texture(map) => {
-                let [r, g, b, _] = texel(map, self.uv(point));
+                let [r, g, b, _] = texel(map, self.uv(point.place.1 as usize, point.barycentrics));
                 Rgb::new(r, g, b)
             }
         }
     }
 
     pub fn roughness(&self, surface: &Boundary, point: &Point) -> f64 {
-        match &surface.roughness {
-            Varying::Constant(roughness) => *roughness,
-            Varying::Texture(map) => map.as_number().of(texel(map, self.uv(point))),
-        }
+        number(&surface.roughness, self.uv(point.place.1 as usize, point.barycentrics))
+    }
+}
+
+/// What a number is at these texture coordinates.
+pub fn number(value: &Varying<f64>, uv: (f64, f64)) -> f64 {
+    match value {
+        Varying::Constant(value) => *value,
+        Varying::Texture(map) => map.as_number().of(texel(map, uv)),
     }
 }
 

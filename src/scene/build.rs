@@ -7,7 +7,7 @@ use crate::scene::reader::Reader;
 use crate::scene::scene_file::{EnvironmentSpec, LightSpec, MeshSpec, ObjectSpec, SceneFile};
 use crate::scene::{
     Camera, Deform, Light, LightKind, Material, MeshSource, Normals, Object, Scene, Sky, TechniqueText, TextureMap,
-    Transform, ViewSettings,
+    Transform, Varying, ViewSettings,
 };
 use glam::DVec3;
 use std::collections::BTreeSet;
@@ -197,6 +197,14 @@ fn object(
             Some(reader.default_material())
         }
     };
+    if let (Some(mesh), Some(material)) = (&mesh, &material)
+        && let Some(layer) = material.layers.iter().find(|layer| matches!(layer.depth, Varying::Texture(_)))
+        && !has_uvs(mesh)
+    {
+        let what =
+            format!("this mesh has no texture coordinates, but an image says how deep its `{}` reaches", layer.name);
+        judge.wrong(&at("mesh"), what, "give every face of the mesh texture coordinates, or the layer one depth");
+    }
     let scale = DVec3::from(spec.transform.scale.0);
     judge.all(
         &at("transform.scale"),
@@ -294,6 +302,14 @@ fn mesh(path: &str, spec: &MeshSpec, reader: &Reader, judge: &mut Judge<'_>) -> 
         }
     };
     Some(source)
+}
+
+fn has_uvs(mesh: &MeshSource) -> bool {
+    match mesh {
+        MeshSource::File { mesh, .. } => !mesh.uvs.is_empty(),
+        MeshSource::Sculpture { .. } => false,
+        _ => true,
+    }
 }
 
 fn divisor(a: u32, b: u32) -> u32 {

@@ -70,6 +70,31 @@ fn a_view_can_be_the_truth_and_an_object_cannot() {
 }
 
 #[test]
+fn layers_are_seen_by_those_that_follow_light_through_them() {
+    let desk = Desk::new();
+    let layer = r#"Material(version: 1, medium: Coefficients(sigma_a: 1, sigma_s: 9, g: 0), layers: [
+        (name: "skin", medium: Coefficients(sigma_a: (0, 5, 9), sigma_s: (9, 5, 1), g: 0), depth: 0.5)])"#;
+    desk.write("layers.ron", layer);
+    desk.write("even.ron", layer.replace("0.5)", "0)"));
+    let trace = |integrator: &str, material: &str| {
+        let set = format!("objects.ball.material=\"{material}\"");
+        let words = ["reference", "scene.ron", "--spp", "2", "-o", "a.exr", "--integrator", integrator, "--set", &set];
+        desk.run_with(&NO_ADAPTER, &words).ok();
+        pixels(&desk, "a.exr")
+    };
+    for integrator in ["volume", "layered", "bssrdf"] {
+        let differs = trace(integrator, "layers.ron") != trace(integrator, "even.ron");
+        assert_eq!(differs, integrator != "bssrdf", "{integrator}");
+    }
+    assert_ne!(trace("layered", "layers.ron"), trace("volume", "layers.ron"));
+    let layered = "Reference(integrator: Layered, max_spp: 2)";
+    let words =
+        ["render", "scene.ron", "-o", "b.exr", "--technique", layered, "--set", "objects.ball.material=\"layers.ron\""];
+    desk.run_with(&NO_ADAPTER, &words).ok();
+    assert_eq!(pixels(&desk, "b.exr"), trace("layered", "layers.ron"));
+}
+
+#[test]
 fn the_truth_says_how_far_it_is() {
     let desk = Desk::new();
     let words = ["reference", "scene.ron", "-o", "a.exr", "--light", "direct"];
@@ -80,7 +105,7 @@ fn the_truth_says_how_far_it_is() {
     assert!(near["relative_standard_error"].as_f64().unwrap() <= 0.5);
     run(&["--seconds", "0.2"]).ok();
     run(&["--seconds", "0"]).fails(2, &["--seconds"]);
-    run(&["--integrator", "layered"]).fails(2, &["--integrator"]);
+    run(&["--integrator", "walks"]).fails(2, &["--integrator"]);
     run(&["--spp", "0"]).fails(2, &["--spp"]);
     run(&["--variance", "v.png"]).fails(2, &["--variance", ".exr"]);
 }
