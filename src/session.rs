@@ -87,11 +87,11 @@ impl Session {
     /// The device, opened when it is first asked for.
     pub fn gpu(&mut self) -> Result<&Gpu, Problem> {
         if self.gpu.is_none() {
-            let mut gpu = Gpu::open(self.options.adapter.as_deref())?;
-            gpu.timed = self.timed;
-            self.gpu = Some(gpu);
+            self.gpu = Some(Gpu::open(self.options.adapter.as_deref())?);
         }
-        Ok(self.gpu.as_ref().expect("it was opened above"))
+        let gpu = self.gpu.as_mut().expect("it was opened above");
+        gpu.timed = self.timed;
+        Ok(gpu)
     }
 
     /// The plan for a picture, and the picture.
