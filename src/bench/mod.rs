@@ -37,6 +37,7 @@ use crate::image::Image;
 use crate::metric::{Unit, heat_map};
 use crate::problem::Problem;
 use crate::reference;
+use crate::reference::film::Film;
 use crate::reference::random::Random;
 use crate::session::{Goal, Session};
 use crate::store::{Key, Plan, Values, Watch, fingerprint};
@@ -130,6 +131,9 @@ pub fn measure(
     Ok(Measured { truths, shown, new_rows: record.samples.0.len() - rows_kept, warnings })
 }
 
+/// Of fewer samples the variance is a guess: pixels that no light has found yet seem to be sure of it.
+const LEAST_SAMPLES: u64 = 64;
+
 fn trace(
     session: &mut Session,
     case: &Case,
@@ -140,8 +144,7 @@ fn trace(
     let mut traced = Vec::new();
     for &truth in &case.truths {
         let settings = errors::settings(truth, &case.scene, &case.look.view);
-        let goal = Goal::Error { part: PART, at_most: case.max_error, max_samples: case.max_samples };
-        let film = session.trace(&case.scene, &settings, &goal, watch, |film| {
+        let each = |film: &Film| {
             tell(&format!(
                 "{}: {}, {} samples per pixel, relative standard error {:.4}",
                 case.name,
@@ -149,7 +152,14 @@ fn trace(
                 film.samples,
                 film.relative_standard_error(PART)
             ));
-        })?;
+        };
+        let goal = Goal::Error {
+            part: PART,
+            at_most: case.max_error,
+            min_samples: LEAST_SAMPLES,
+            max_samples: case.max_samples,
+        };
+        let film = session.trace(&case.scene, &settings, &goal, watch, each)?;
         let error = film.relative_standard_error(PART);
         if error > case.max_error {
             let what = format!(

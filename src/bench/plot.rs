@@ -156,15 +156,15 @@ impl Axis {
         self.from + (self.to - self.from) * (value / self.low).ln() / (self.high / self.low).ln()
     }
 
-    /// Powers of ten, and what lies between them when there are few.
+    /// Powers of ten, and what lies between them where there are few.
     fn ticks(&self) -> Vec<f64> {
-        let decades = (self.low.log10().floor() as i32, self.high.log10().ceil() as i32);
-        let steps: &[f64] = match decades.1 - decades.0 {
-            ..=3 => &[1.0, 2.0, 5.0],
-            _ => &[1.0],
+        let decades = self.low.log10().floor() as i32..=self.high.log10().ceil() as i32;
+        let ticks = |steps: &[f64]| -> Vec<f64> {
+            let all = decades.clone().flat_map(|k| steps.iter().map(move |step| step * 10f64.powi(k)));
+            all.filter(|tick| (self.low..=self.high).contains(tick)).collect()
         };
-        let all = (decades.0..=decades.1).flat_map(|k| steps.iter().map(move |step| step * 10f64.powi(k)));
-        all.filter(|tick| (self.low..=self.high).contains(tick)).collect()
+        let coarse = [ticks(&[1.0]), ticks(&[1.0, 2.0, 5.0])].into_iter().find(|ticks| ticks.len() >= 3);
+        coarse.unwrap_or_else(|| ticks(&[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]))
     }
 }
 
@@ -200,9 +200,9 @@ mod tests {
     #[test]
     fn axes_have_round_numbers() {
         let ticks = |values: &[f64]| Axis::of(values.iter().copied(), 0.0, 100.0).ticks();
-        assert_eq!(ticks(&[3.0]), [2.0]);
+        assert_eq!(ticks(&[3.1]), [3.0, 4.0]);
         assert_eq!(ticks(&[0.9, 12.0]), [1.0, 2.0, 5.0, 10.0]);
-        assert_eq!(ticks(&[1e-6, 1.0]).len(), 8);
+        assert_eq!(ticks(&[1e-6, 1.0]).len(), 7);
         let axis = Axis::of([1.0, 100.0], 10.0, 110.0);
         assert!((axis.at(10.0) - 60.0).abs() < 1e-9 && axis.at(1.0) > 10.0 && axis.at(100.0) < 110.0);
         assert_eq!([0.02, 5.0, 1e-6, 10.0 * 0.1].map(plain), ["0.02", "5", "1e-6", "1"]);
