@@ -83,8 +83,7 @@ fn is_slower(old: &Quartiles, new: &Quartiles) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::samples::tests::subject;
-    use super::super::summary::tests::samples;
+    use super::super::tests::{samples, subject};
     use super::*;
 
     fn measures(found: &[Worse]) -> Vec<(&str, &str)> {

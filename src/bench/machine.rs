@@ -91,21 +91,9 @@ fn date(day: u64) -> (u64, u64, u64) {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
+    use super::super::tests::machine;
     use super::*;
-
-    pub fn machine() -> Machine {
-        Machine {
-            adapter: "llvmpipe <1> (Vulkan, Cpu)".into(),
-            driver: "Mesa".into(),
-            is_software: true,
-            cpu: "a CPU".into(),
-            threads: 2,
-            commit: "unknown".into(),
-            is_optimised: true,
-            date: "2024-02-29".into(),
-        }
-    }
 
     #[test]
     fn days_have_their_dates_and_a_software_adapter_is_named_as_such() {

@@ -241,24 +241,4 @@ fn sample(subject: &Subject, measure: &str, unit: &'static str, repeat: u32, val
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lots_are_drawn_and_nothing_is_lost() {
-        let mut lots: Vec<usize> = (0..50).map(|i| i / 10).collect();
-        let sorted = lots.clone();
-        shuffle(&mut lots);
-        assert_ne!(lots, sorted);
-        let mut twin = sorted.clone();
-        shuffle(&mut twin);
-        assert_eq!(lots, twin, "the same lots every time");
-        lots.sort_unstable();
-        assert_eq!(lots, sorted);
-    }
-
-    #[test]
-    fn the_code_that_is_named_is_there() {
-        fingerprint(&CODE);
-    }
-}
+mod tests;

@@ -156,45 +156,12 @@ fn base64(bytes: &[u8]) -> String {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
-    use super::super::machine::tests::machine;
-    use super::super::samples::tests::subject;
-    use super::super::summary::tests::samples;
+mod tests {
+    use super::super::tests::{is_well_formed, machine, samples, subject};
     use super::*;
     use crate::reference::film::Film;
     use crate::scene::Truth;
     use std::sync::Arc;
-
-    /// Whether every tag of XML is closed in order, and every attribute quoted; a declaration may stand in front.
-    pub fn is_well_formed(text: &str) -> bool {
-        let mut open: Vec<&str> = Vec::new();
-        let mut rest = text.strip_prefix("<!DOCTYPE html>").unwrap_or(text);
-        while let Some(start) = rest.find('<') {
-            let Some(end) = rest[start..].find('>').map(|end| start + end) else { return false };
-            let tag = &rest[start + 1..end];
-            if rest[..start].contains('>') || tag.matches('"').count() % 2 == 1 || tag.contains('<') {
-                return false;
-            }
-            let name = tag.trim_matches('/').split(' ').next().unwrap_or_default();
-            if tag.starts_with('/') {
-                if open.pop() != Some(name) {
-                    return false;
-                }
-            } else if !tag.ends_with('/') {
-                open.push(name);
-            }
-            rest = &rest[end + 1..];
-        }
-        open.is_empty()
-    }
-
-    #[test]
-    fn tags_that_do_not_fit_are_noticed() {
-        assert!(is_well_formed("<a b=\"c\"><d/>text</a>"));
-        for wrong in ["<a>", "<a></b>", "<a b=\"c></a>", "<a>1 > 2</a>", "</a>", "<a", "<a <b/></a>"] {
-            assert!(!is_well_formed(wrong), "{wrong}");
-        }
-    }
 
     #[test]
     fn the_page_holds_everything_in_itself() {

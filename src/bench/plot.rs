@@ -178,8 +178,7 @@ fn plain(value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::machine::tests::machine;
-    use super::super::summary::tests::samples;
+    use super::super::tests::{is_well_formed, machine, samples};
     use super::*;
 
     #[test]
@@ -194,7 +193,7 @@ mod tests {
         let front = svg.split("<polyline points=\"").nth(1).unwrap().split('"').next().unwrap();
         assert_eq!(front.split(' ').count(), 2);
         assert!(svg.contains("nothing was measured"));
-        assert!(super::super::page::tests::is_well_formed(&svg));
+        assert!(is_well_formed(&svg));
     }
 
     #[test]

@@ -135,8 +135,7 @@ fn read(folder: &Path) -> Result<Option<(Samples, MachineFile)>, Problem> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::machine::tests::machine;
-    use super::super::samples::tests::{sample, subject};
+    use super::super::tests::{machine, sample, subject};
     use super::*;
 
     #[test]

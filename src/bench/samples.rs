@@ -91,7 +91,7 @@ impl Samples {
             Some((_, head)) if head.join(",") == HEADER => {}
             _ => return Err((1, format!("the columns are not {HEADER}"))),
         }
-        let sample = |(line, fields): (usize, Vec<String>)| {
+        let sample = |(line, fields): Fields| {
             let count = fields.len();
             let Ok([scene, technique, settings, size, measure, unit, repeat, value]) = <[String; 8]>::try_from(fields)
             else {
@@ -115,8 +115,11 @@ fn quoted(field: &str) -> String {
     }
 }
 
-/// The fields of each record, with the line on which it begins.
-fn records(text: &str) -> Result<Vec<(usize, Vec<String>)>, (usize, String)> {
+/// The line on which a record begins, 1-based, and its fields.
+type Fields = (usize, Vec<String>);
+
+/// Every record of a text.
+fn records(text: &str) -> Result<Vec<Fields>, (usize, String)> {
     let mut records = Vec::new();
     let mut letters = text.chars().peekable();
     let (mut line, mut begins) = (1, 1);
@@ -152,18 +155,9 @@ fn records(text: &str) -> Result<Vec<(usize, Vec<String>)>, (usize, String)> {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
+    use super::super::tests::{sample, subject};
     use super::*;
-
-    pub fn subject(technique: &str, settings: &str) -> Subject {
-        let [scene, technique, settings, size] = ["ball", technique, settings, "32x32"].map(String::from);
-        Subject { scene, technique, settings, size }
-    }
-
-    pub fn sample(subject: &Subject, measure: &str, repeat: u32, value: f64) -> Sample {
-        let unit = if measure.contains('@') { "1" } else { "ms" };
-        Sample { subject: subject.clone(), measure: measure.into(), unit, repeat, value }
-    }
 
     #[test]
     fn what_is_written_is_read_again_to_the_last_bit() {

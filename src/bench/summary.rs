@@ -198,30 +198,9 @@ pub fn milliseconds(time: &Quartiles) -> String {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
-    use super::super::samples::tests::{sample, subject};
+mod tests {
+    use super::super::tests::samples;
     use super::*;
-
-    /// A contender with a time, and an error with its standard error.
-    pub fn samples(contenders: &[(&str, f64, f64, f64)]) -> (Samples, Vec<Line>) {
-        let mut samples = Samples::default();
-        for (name, time, relmse, se) in contenders {
-            let of = subject(name, "");
-            samples.0.extend((1..=3).map(|n| sample(&of, "frame", n, time * (0.98 + 0.01 * f64::from(n)))));
-            samples.0.extend((1..=3).map(|n| sample(&of, "pass:a", n, time / 2.0)));
-            samples.0.push(sample(&of, "bake", 1, 5.0));
-            let errors = [("relmse", *relmse), ("relmse_se", *se), ("dssim", 0.1), ("flip_mean", 0.1)];
-            let rest = [("flip_p99", 0.2), ("bias", -0.12), ("bias_se", 0.01)];
-            samples
-                .0
-                .extend(errors.into_iter().chain(rest).map(|(m, value)| sample(&of, &format!("{m}@volume"), 1, value)));
-        }
-        let lines = contenders
-            .iter()
-            .map(|(name, ..)| Line::of(&samples, &subject(name, ""), &[Truth::Volume, Truth::Bssrdf]))
-            .collect();
-        (samples, lines)
-    }
 
     #[test]
     fn sentences_say_what_the_numbers_do() {

@@ -1,6 +1,7 @@
 use super::look::parse_size;
 use super::progress::{Progress, seconds};
 use super::{Answer, counted, session};
+use crate::bench::errors::{PART, Traced};
 use crate::bench::summary::{Line, milliseconds, number, sentences};
 use crate::bench::{Case, Machine, Measured, Record, Wishes, cases, checks, measure, page, plot, record};
 use crate::image::{Display, write_file};
@@ -177,7 +178,7 @@ impl Written<'_> {
         let mut text = format!("{}, {}\n", self.case.name, self.size);
         let mut head = format!("  {:<36} {:>28} {:>10}", "technique", "frame", "bake");
         for truth in &self.case.truths {
-            head += &format!(" {:>22}", format!("relmse@{}", truth.word()));
+            head += &format!(" {:>30}", format!("relmse@{} ± se", truth.word()));
         }
         text += &format!("{head}\n");
         for line in &self.lines {
@@ -185,7 +186,8 @@ impl Written<'_> {
             let bake = line.bake.map(|time| format!("{} ms", number(time))).unwrap_or_default();
             text += &format!("  {:<36} {frame:>28} {bake:>10}", line.words);
             for (_, error) in &line.errors {
-                text += &format!(" {:>22}", error.words());
+                let beside = format!("{} ± {}", error.words(), number(error.relmse_se));
+                text += &format!(" {beside:>30}");
             }
             text.push('\n');
         }
@@ -197,13 +199,19 @@ impl Written<'_> {
     }
 
     fn facts(&self) -> Value {
-        let error = |truth: &crate::scene::Truth| sentences(&self.lines, *truth);
+        let said = |truth: &crate::scene::Truth| sentences(&self.lines, *truth);
+        let truth = |traced: &Traced| {
+            let error = traced.film.relative_standard_error(PART);
+            let facts = json!({ "samples": traced.film.samples, "relative_standard_error": error });
+            (traced.truth.word().to_string(), facts)
+        };
         json!({
             "scene": self.case.name,
             "size": self.size,
             "svg": self.path.display().to_string(),
+            "truths": self.measured.truths.iter().map(truth).collect::<serde_json::Map<_, _>>(),
             "techniques": self.lines,
-            "sentences": self.case.truths.iter().flat_map(error).collect::<Vec<_>>(),
+            "sentences": self.case.truths.iter().flat_map(said).collect::<Vec<_>>(),
         })
     }
 }
