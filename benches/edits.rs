@@ -9,6 +9,7 @@
 //! first picture only: so an edit's share is rather too large. The time is that from the moment when the files are saved
 //! until the picture is encoded as PNG.
 
+use diaphane::bench::Machine;
 use diaphane::gpu::Shaders;
 use diaphane::image::{Display, Format};
 use diaphane::problem::Problems;
@@ -18,9 +19,9 @@ use diaphane::session::{Options, Session};
 use diaphane::store::{Disk, Finished, Origin, Store, Watch};
 use std::fmt::Write;
 use std::path::Path;
-use std::process::{Command, ExitCode};
+use std::process::ExitCode;
 use std::sync::Mutex;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 /// Every kind of light, two translucent things of some ten thousand vertices and a floor with a texture.
 const SCENE: &str = r#"Scene(
@@ -195,45 +196,12 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// The first line that a program prints, or that it has nothing to say.
-fn said(program: &str, words: &[&str]) -> String {
-    let output = Command::new(program).args(words).output().ok().filter(|output| output.status.success());
-    let text = output.and_then(|output| String::from_utf8(output.stdout).ok());
-    text.and_then(|text| Some(text.lines().next()?.trim().to_string())).unwrap_or_else(|| "unknown".into())
-}
-
 fn machine(session: &mut Session) -> Result<String, Problems> {
-    let adapter = session.gpu()?.adapter.clone();
-    let known = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let cpu = known.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": ").map(|(_, name)| name));
-    let cpu = cpu.map_or_else(|| said("sysctl", &["-n", "machdep.cpu.brand_string"]), str::to_string);
-    let cores = std::thread::available_parallelism().map_or(0, usize::from);
-    let changed = said("git", &["status", "--porcelain", "-uno"]) != "unknown";
-    let seconds = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |time| time.as_secs());
-    let (year, month, day) = date(seconds / 86400);
+    let machine = Machine::of(session.gpu()?);
     Ok(format!(
-        "adapter: {} ({:?}, {:?})\ndriver:  {} {}\nCPU:     {cpu}, {cores} threads\ncommit:  {}{}\ndate:    \
-         {year}-{month:02}-{day:02}\n",
-        adapter.name,
-        adapter.backend,
-        adapter.device_type,
-        adapter.driver,
-        adapter.driver_info,
-        said("git", &["rev-parse", "HEAD"]),
-        if changed { ", with changes" } else { "" },
+        "adapter: {}\ndriver:  {}\nCPU:     {}, {} threads\ncommit:  {}\ndate:    {}\n",
+        machine.adapter, machine.driver, machine.cpu, machine.threads, machine.commit, machine.date,
     ))
-}
-
-/// Year, month and day of the n-th day since 1970, in years that begin in March, so that a leap day is the last.
-fn date(day: u64) -> (u64, u64, u64) {
-    let day = day + 719_468; // since the first of March of the year 0
-    let (era, day) = (day / 146_097, day % 146_097);
-    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
-    let day = day - (365 * year + year / 4 - year / 100);
-    let month = (5 * day + 2) / 153;
-    let day = day - (153 * month + 2) / 5 + 1;
-    let month = if month < 10 { month + 3 } else { month - 9 };
-    (era * 400 + year + u64::from(month <= 2), month, day)
 }
 
 fn main() -> ExitCode {

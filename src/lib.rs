@@ -46,6 +46,7 @@
 //! | [`techniques`] | one folder = one paper's way, with its manual | their bakes: shape, medium or kernel change |
 //! | [`render`] | the straight line from scene to image | |
 //! | [`session`] | what a command holds while it works | |
+//! | [`bench`] | time against error, for techniques × settings | scene, technique or code change |
 //! | `preview` | the window; a feature of the build | a hand, a file or the worker moves |
 //! | [`commands`] | the words of the command line | |
 //!
@@ -66,6 +67,7 @@
 //! Materials as node graphs, a scene graph, far and near planes, shadow settings, tangent lengths in pixels: whatever an
 //! artist would have to tune per scene and the program can know.
 
+pub mod bench;
 pub mod commands;
 pub mod frame;
 pub mod geometry;

@@ -41,8 +41,8 @@ impl Options {
 pub enum Goal {
     /// So many samples per pixel.
     Samples(u64),
-    /// The relative standard error of a part, or else so many samples.
-    Error { part: Part, at_most: f64, max_samples: u64 },
+    /// The relative standard error of a part, looked at from `min_samples` on, at least 2; or else so many samples.
+    Error { part: Part, at_most: f64, min_samples: u64, max_samples: u64 },
     /// So many seconds: the last doubling of the samples that can be finished in them.
     Seconds(f64),
 }
@@ -87,11 +87,11 @@ impl Session {
     /// The device, opened when it is first asked for.
     pub fn gpu(&mut self) -> Result<&Gpu, Problem> {
         if self.gpu.is_none() {
-            let mut gpu = Gpu::open(self.options.adapter.as_deref())?;
-            gpu.timed = self.timed;
-            self.gpu = Some(gpu);
+            self.gpu = Some(Gpu::open(self.options.adapter.as_deref())?);
         }
-        Ok(self.gpu.as_ref().expect("it was opened above"))
+        let gpu = self.gpu.as_mut().expect("it was opened above");
+        gpu.timed = self.timed;
+        Ok(gpu)
     }
 
     /// The plan for a picture, and the picture.
@@ -115,7 +115,7 @@ impl Session {
                 // No more paths than are needed: the plan holds the most that there may be.
                 let (part, at_most, max_samples) =
                     (look.view.part, reference.max_error(scene), reference.max_spp(scene));
-                let goal = Goal::Error { part, at_most, max_samples };
+                let goal = Goal::Error { part, at_most, min_samples: 2, max_samples };
                 let film = self.trace(scene, &reference.settings(scene, &look.view), &goal, watch, |_| ())?;
                 Arc::new(film.picture(part))
             }
@@ -165,8 +165,8 @@ impl Session {
             let time = started.elapsed();
             let enough = match *goal {
                 Goal::Samples(count) => samples >= count,
-                Goal::Error { part, at_most, max_samples } => {
-                    samples >= max_samples || film.level(part).reaches(at_most)
+                Goal::Error { part, at_most, min_samples, max_samples } => {
+                    samples >= max_samples || samples >= min_samples && film.level(part).reaches(at_most)
                 }
                 // The next doubling takes twice as long as the last: it is begun only if it can be finished.
                 Goal::Seconds(seconds) => (time + 2 * (time - before)).as_secs_f64() > seconds,

@@ -55,6 +55,7 @@ fn said(file: &Path) -> String {
     let read = match reader.kind_of(file) {
         Ok(Kind::Scene) => reader.scene(file, &[]).map(|(_, warnings)| warnings),
         Ok(Kind::Material) => reader.material(file).map(|(_, warnings)| warnings),
+        Ok(Kind::Bench) => reader.bench(file).map(|_| Vec::new()),
         Err(problem) => Err(problem.into()),
     };
     let problems = read.unwrap_or_else(|Problems(problems)| problems);

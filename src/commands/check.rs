@@ -3,13 +3,14 @@ use crate::problem::{Problem, Problems};
 use crate::render;
 use crate::scene::Kind;
 use crate::session::{Options, Session};
+use crate::techniques;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// Read files with all that they name, and report every problem; draws nothing
 #[derive(clap::Args)]
 pub struct Check {
-    /// Scenes and materials
+    /// Scenes and materials, and what is to be measured of scenes
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Print each file with every default written out
@@ -61,6 +62,15 @@ impl Check {
                 ("scene", format!("a scene of {objects} and {lights}"), warnings)
             }
             Kind::Material => ("material", "a material".to_string(), session.reader.material(file)?.1),
+            Kind::Bench => {
+                let settings = session.reader.bench(file)?;
+                let named = settings.techniques.unwrap_or_default();
+                let wrong: Vec<Problem> = named.iter().filter_map(|text| techniques::read(text).err()).collect();
+                if !wrong.is_empty() {
+                    return Err(Problems(wrong));
+                }
+                ("bench", "what to measure of a scene".to_string(), Vec::new())
+            }
         };
         let mut facts = json!({ "file": file.display().to_string(), "kind": kind });
         let text = match self.defaults {

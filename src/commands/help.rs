@@ -3,7 +3,7 @@
 use super::{Answer, Said, Words, pretty};
 use crate::problem::{Cause, Problem};
 use clap::CommandFactory;
-use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::error::ErrorKind;
 use serde_json::json;
 use std::ffi::OsString;
 
@@ -30,9 +30,6 @@ Exit status:
 
 `diaphane help COMMAND` says more of each.";
 
-/// Words that will mean something, and what does something like it by now.
-const LATER: [(&str, &str); 1] = [("bench", "`diaphane render SCENE -o OUT.png --timings` says what each step took")];
-
 /// Whether words that cannot be read ask for JSON.
 pub fn wants_json(words: &[OsString]) -> bool {
     words.iter().take_while(|word| *word != "--").any(|word| word == "--json")
@@ -55,14 +52,6 @@ pub fn complaint(error: &clap::Error, json: bool) -> Said {
     let text = error.render().to_string();
     if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
         return Said::facts(if json { pretty(&json!({ "text": text })) } else { text });
-    }
-    let word = match error.get(ContextKind::InvalidSubcommand) {
-        Some(ContextValue::String(word)) => Some(word.as_str()),
-        _ => None,
-    };
-    if let Some((word, instead)) = LATER.iter().find(|(later, _)| Some(*later) == word) {
-        let what = format!("`{word}` is not in this version ({})", env!("CARGO_PKG_VERSION"));
-        return Said::wrong(&Problem::new(Cause::Words, what).hint(*instead).into(), json);
     }
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         let problem = Problem::new(Cause::Words, "another word is missing").hint("`--help` lists what can follow");

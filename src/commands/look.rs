@@ -37,7 +37,7 @@ enum PartFlag {
 }
 
 /// `960x540`
-fn parse_size(text: &str) -> Result<(u32, u32), String> {
+pub(super) fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let parse = |side: &str| side.parse::<u32>().ok().filter(|side| (1..=16384).contains(side));
     text.split_once('x')
         .and_then(|(width, height)| Some((parse(width)?, parse(height)?)))

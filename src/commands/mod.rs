@@ -1,6 +1,7 @@
 //! The commands: what the words mean, one file each. [`answer`] makes words into what is to be printed.
 
 mod bake;
+mod bench;
 mod cache;
 mod check;
 mod compare;
@@ -68,6 +69,7 @@ enum Command {
     Preview(preview::Preview),
     Bake(bake::Bake),
     Compare(compare::Compare),
+    Bench(bench::Bench),
     #[command(subcommand)]
     Media(media::Media),
     #[command(subcommand)]
@@ -209,6 +211,7 @@ impl Words {
             Some(Command::Bake(command)) => command.run(options)?,
             Some(Command::Reference(command)) => command.run(options)?,
             Some(Command::Compare(command)) => command.run(options)?,
+            Some(Command::Bench(command)) => command.run(options)?,
             Some(Command::Media(command)) => command.run(options)?,
             Some(Command::Techniques(command)) => command.run()?,
             Some(Command::Cache(command)) => command.run(options)?,

@@ -167,7 +167,10 @@ impl Trace {
         let goal = match (self.spp, self.seconds) {
             (Some(count), _) => Goal::Samples(count),
             (None, Some(seconds)) => Goal::Seconds(seconds),
-            (None, None) => Goal::Error { part, at_most: self.max_error.unwrap_or(own.max_error), max_samples },
+            (None, None) => {
+                let at_most = self.max_error.unwrap_or(own.max_error);
+                Goal::Error { part, at_most, min_samples: 2, max_samples }
+            }
         };
         let progress = Progress::new();
         let film =

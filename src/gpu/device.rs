@@ -166,6 +166,18 @@ impl Gpu {
         self.gone.get().is_some()
     }
 
+    /// Bytes that are allocated on the device now, the textures that wait for their next use among them. None where the
+    /// system keeps no books: on Metal.
+    pub fn allocated(&self) -> Option<u64> {
+        self.device.generate_allocator_report().map(|report| report.total_allocated_bytes)
+    }
+
+    /// Gives back to the system what nobody holds any more.
+    pub fn free(&self) -> Result<(), Problem> {
+        self.pool.clear();
+        self.wait()
+    }
+
     pub fn texture(&self, shape: Shape) -> Texture {
         self.pool.take(&self.device, shape)
     }

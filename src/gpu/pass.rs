@@ -161,16 +161,23 @@ impl Step for Compute {
             unreachable!("a compute pass has a compute pipeline")
         };
         let group = bind::group(&gpu.device, &layout, &wanted, &ready);
+        let stopwatch = gpu.stopwatch();
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
+            let timestamp_writes = stopwatch.as_ref().map(|query_set| wgpu::ComputePassTimestampWrites {
+                query_set,
+                beginning_of_pass_write_index: Some(0),
+                end_of_pass_write_index: Some(1),
+            });
+            let mut pass =
+                encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(self.name), timestamp_writes });
             pass.set_pipeline(&pipeline);
             pass.set_bind_group(0, &group, &[]);
             let groups = count.div_ceil(64) as u32;
             // A dispatch has at most 65,535 groups along an axis: the shader puts the two together again.
             pass.dispatch_workgroups(groups.min(ROW_OF_GROUPS), groups.div_ceil(ROW_OF_GROUPS), 1);
         }
-        gpu.submit(run, self.name, encoder, None)?;
+        gpu.submit(run, self.name, encoder, stopwatch)?;
         drop::<Vec<Ready>>(ready);
         Ok(Arc::into_inner(output).expect("nothing holds the output any more"))
     }

@@ -118,6 +118,11 @@ const MOST_FREE_BYTES: u64 = 512 << 20;
 pub struct Pool(Arc<Mutex<VecDeque<(Shape, wgpu::Texture)>>>);
 
 impl Pool {
+    /// Gives all of it back to the system.
+    pub fn clear(&self) {
+        self.0.lock().expect("no panic while pooling").clear();
+    }
+
     pub fn take(&self, device: &wgpu::Device, shape: Shape) -> Texture {
         let mut free = self.0.lock().expect("no panic while pooling");
         let found =

@@ -25,6 +25,9 @@ pub struct RelMse {
     pub errors: Errors,
     /// What was taken off for the reference's variance, in the same measure.
     pub noise: Option<Errors>,
+    /// The standard error of the mean that the reference's noise leaves in it: below about three of them, what is left
+    /// cannot be told from none.
+    pub standard_error: Option<f64>,
 }
 
 /// `variance` is that of each of the reference's pixels: its standard error squared, W²/(m² sr)² in each channel.
@@ -54,5 +57,20 @@ pub fn relmse(pair: &Pair, variance: Option<&Image>) -> Result<RelMse, Problem> 
         let (x, reference) = pair.values(i, c);
         (x - reference).powi(2) - noise_of(i, c)
     };
-    Ok(RelMse { errors: relative(&error), noise: variance.map(|_| relative(&noise_of)) })
+    let standard_error = variance.map(|_| {
+        let relative = |i: usize, c: usize| {
+            let (x, reference) = pair.values(i, c);
+            ratio(deviation(x - reference, noise_of(i, c)), reference.powi(2) + floor)
+        };
+        // A path brings light to all channels at once: their noise is taken to go together, that of pixels not.
+        let squares = pair.counted().map(|i| (0..3).map(|c| relative(i, c)).sum::<f64>().powi(2));
+        squares.sum::<f64>().sqrt() / (3 * pair.count()) as f64
+    });
+    Ok(RelMse { errors: relative(&error), noise: variance.map(|_| relative(&noise_of)), standard_error })
+}
+
+/// The standard deviation of (x - ref)^2, where `off` is x - ref and ref is normal with variance v about the truth t: its
+/// square is 4 (x - t)^2 v + 2 v^2, and (x - t)^2 is off^2 - v on average, but never below 0.
+fn deviation(off: f64, v: f64) -> f64 {
+    (4.0 * (off * off - v).max(0.0) * v + 2.0 * v * v).sqrt()
 }

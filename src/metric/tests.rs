@@ -222,6 +222,29 @@ fn the_variance_of_the_reference_is_taken_off() {
 }
 
 #[test]
+fn the_standard_error_of_relmse_is_that_of_other_noise() {
+    let truth = scaled(&ball(), 4.0);
+    // Small against the floor, or the quotient is off by more than its error.
+    let se = 0.004_f32;
+    let variance = Image::filled(SIZE.0, SIZE.1, [se * se; 3]);
+    for factor in [1.0, 1.1] {
+        let image = scaled(&truth, factor);
+        let right = relmse(&Pair::new(&image, &truth).unwrap(), None).unwrap().errors.all.mean;
+        let squares: Vec<f64> = (0..40)
+            .map(|k| {
+                let noisy =
+                    map(&truth, |i, pixel| pixel.map(|v| v + se * normal((100_000 * (k + 1) + i) as u64) as f32));
+                let found = relmse(&Pair::new(&image, &noisy).unwrap(), Some(&variance)).unwrap();
+                ((found.errors.all.mean - right) / found.standard_error.unwrap()).powi(2)
+            })
+            .collect();
+        let rms = (squares.iter().sum::<f64>() / 40.0).sqrt();
+        // A little below 1 where there is no error: there its estimate is never below 0.
+        assert!((0.4..1.4).contains(&rms), "{factor}: {rms}");
+    }
+}
+
+#[test]
 fn percentiles_are_those_of_nearest_rank() {
     let spread = Spread::of((1..=200).map(f64::from));
     assert_eq!((spread.mean, spread.p99), (100.5, 198.0));

@@ -77,6 +77,8 @@ pub fn open(files: &Files, path: &Path) -> Result<Node, Problem> {
 pub enum Kind {
     Scene,
     Material,
+    /// What is to be measured of a scene.
+    Bench,
 }
 
 impl Kind {
@@ -84,17 +86,20 @@ impl Kind {
         match self {
             Kind::Scene => "Scene",
             Kind::Material => "Material",
+            Kind::Bench => "Bench",
         }
     }
-    /// By its name, or by fields that only one of the two has.
+    /// By its name, or by fields that only one of them has.
     pub fn of(root: &Node) -> Option<Kind> {
         let has = |names: &[&str]| names.iter().any(|n| root.field(n).is_some());
         match root.name() {
             Some("Scene") => Some(Kind::Scene),
             Some("Material") => Some(Kind::Material),
+            Some("Bench") => Some(Kind::Bench),
             Some(_) => None,
             None if has(&["mm_per_unit", "objects", "camera", "lights"]) => Some(Kind::Scene),
             None if has(&["medium", "surface", "base", "layers", "filter"]) => Some(Kind::Material),
+            None if has(&["techniques", "repetitions", "truths"]) => Some(Kind::Bench),
             None => None,
         }
     }

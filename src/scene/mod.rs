@@ -7,6 +7,7 @@
 //! Lengths of scenes are scene units, those of materials mm; angles are degrees and say so; all numbers are f64. Every
 //! type here is `Serialize`, so that what depends on it can be named by its hash; file contents stand as their [`Key`].
 
+mod bench_file;
 mod build;
 mod de;
 mod document;
@@ -28,6 +29,7 @@ mod warn;
 #[cfg(test)]
 mod tests;
 
+pub use bench_file::{BenchSettings, Truth, beside as bench_beside};
 pub use document::Kind;
 pub use fields::Triple;
 pub use material::{AsNumber, Layer, Material, Surface, TextureMap, Varying};

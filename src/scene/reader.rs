@@ -1,6 +1,7 @@
 //! Reads scenes and materials, and remembers what was costly: meshes and images of the same content are read once.
 
 use crate::problem::{Problem, Problems};
+use crate::scene::bench_file::{self, BenchFile, BenchSettings};
 use crate::scene::document::{self, Kind, at_its_name, check_head, has_line, named, typed};
 use crate::scene::material::{build as build_material, complete};
 use crate::scene::material_file::MaterialFile;
@@ -72,6 +73,12 @@ impl Reader {
         }
     }
 
+    /// What is to be measured of a scene, as a file beside it says.
+    pub fn bench(&self, path: &Path) -> Result<BenchSettings, Problems> {
+        let (file, root) = self.bench_file(path)?;
+        bench_file::build(&file, &root).map_err(|Problems(problems)| in_order(problems))
+    }
+
     /// An image that nothing names but the user, and the warnings about its pixels; what is no number is an error.
     /// `encoding` is that of PNG and JPEG.
     pub fn image(&self, path: &Path, encoding: Encoding) -> Result<(Texture, Vec<Problem>), Problems> {
@@ -84,7 +91,7 @@ impl Reader {
         }
     }
 
-    /// Whether a file holds a scene or a material.
+    /// What a file holds.
     pub fn kind_of(&self, path: &Path) -> Result<Kind, Problem> {
         let root = document::open(&self.files, path)?;
         Kind::of(&root).ok_or_else(|| {
@@ -94,7 +101,7 @@ impl Reader {
         })
     }
 
-    /// The file's text with every default written out; it reads as the same scene or material.
+    /// The file's text with every default written out; it reads as the same.
     pub fn defaults(&self, path: &Path) -> Result<String, Problems> {
         match self.kind_of(path)? {
             Kind::Scene => {
@@ -108,6 +115,11 @@ impl Reader {
                 document::rebase(&mut root, path);
                 Ok(written("Material", &complete(&typed::<MaterialFile>(&root, "")?)))
             }
+            Kind::Bench => {
+                self.bench(path)?;
+                let (file, root) = self.bench_file(path)?;
+                Ok(written("Bench", &bench_file::complete(&file, &root)))
+            }
         }
     }
 
@@ -119,6 +131,12 @@ impl Reader {
             root.set_from_flag(at, ron, &dir)?;
         }
         check_head(&root, Kind::Scene)?;
+        Ok((typed(&root, "")?, root))
+    }
+
+    fn bench_file(&self, path: &Path) -> Result<(BenchFile, Node), Problem> {
+        let root = document::open(&self.files, path)?;
+        check_head(&root, Kind::Bench)?;
         Ok((typed(&root, "")?, root))
     }
 

@@ -4,7 +4,7 @@ include!(concat!(env!("OUT_DIR"), "/code.rs"));
 
 /// A name for the text of all source files whose path begins with one of `prefixes` (`src/optics/`), and for the
 /// versions of the numerical crates.
-pub(super) fn fingerprint(prefixes: &[&str]) -> [u8; 32] {
+pub fn fingerprint(prefixes: &[&str]) -> [u8; 32] {
     let mut hash = blake3::Hasher::new();
     hash.update(CRATES.as_bytes());
     for prefix in prefixes {

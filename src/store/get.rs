@@ -50,7 +50,15 @@ struct Nobody;
 impl Watch for Nobody {}
 
 /// Values on their way from one store to another.
+#[derive(Clone, Default)]
 pub struct Values(Vec<(Key, Value)>);
+
+impl Values {
+    /// Drops all whose names do not pass.
+    pub fn retain(&mut self, keep: impl Fn(&Key) -> bool) {
+        self.0.retain(|(key, _)| keep(key));
+    }
+}
 
 /// Values by name. A value stays in memory as long as one of the last few plans names it: not by when it was touched,
 /// since a value behind a hit is never touched, and is exactly what the next edit needs.

@@ -12,6 +12,7 @@ mod key;
 mod plan;
 mod run;
 
+pub use code::fingerprint;
 pub use disk::{Disk, Entry, Swept};
 pub use files::{File, Files};
 pub use follow::Follow;

@@ -42,14 +42,19 @@ pub struct Entry {
     pub name: &'static str,
     /// The header of its module.
     pub manual: &'static str,
+    /// Settings, beside the defaults, with which it is worth measuring: what the benchmark adds when it is to show every
+    /// setting. Each is a whole text: `LongRange(layers: 16)`.
+    pub sweep: &'static [&'static str],
     pub read: fn(&TechniqueText) -> Result<Box<dyn Technique>, Problem>,
 }
 
+/// `entry!(long_range, LongRange)`, or with the settings that are worth measuring behind it.
 macro_rules! entry {
-    ($module:ident, $type:ident) => {
+    ($module:ident, $type:ident $(, $setting:literal)*) => {
         Entry {
             name: stringify!($type),
             manual: include_str!(concat!(stringify!($module), "/mod.rs")),
+            sweep: &[$($setting),*],
             read: |text| Ok(Box::new(text.settings::<$module::$type>()?)),
         }
     };
@@ -62,6 +67,7 @@ pub const REGISTRY: &[Entry] = &[
     Entry {
         name: Reference::NAME,
         manual: include_str!("reference.rs"),
+        sweep: &[],
         // It has no part in a frame: see `way`.
         read: |text| Reference::of(text).and_then(|_| Err(Reference::only_in_the_view(text))),
     },
@@ -142,6 +148,10 @@ mod tests {
             assert!(read(&text).is_ok() || Reference::of(&text).unwrap().is_some());
             let text = TechniqueText::from_flag("--technique", &format!("{}(oops: 1)", entry.name)).unwrap();
             assert!(read(&text).err().unwrap().what.contains("oops"));
+            for setting in entry.sweep {
+                let text = TechniqueText::from_flag("--technique", setting).unwrap();
+                assert!(read(&text).is_ok() && text.name == entry.name, "{setting}");
+            }
         }
     }
 

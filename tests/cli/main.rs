@@ -1,5 +1,6 @@
 //! The command line as it is seen from outside: words in; stdout, stderr, exit status and files out.
 
+mod benchmark;
 mod comparing;
 mod files;
 mod mistakes;
