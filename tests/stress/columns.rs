@@ -13,39 +13,38 @@ use std::fmt;
 pub struct Column {
     /// In the table.
     pub name: String,
-    /// The technique's name and settings, without its last bracket.
-    begins: String,
+    /// What a view names.
+    pub technique: String,
     pub is_traced: bool,
 }
 
 impl Column {
     pub fn drawn(name: &str) -> Column {
-        Column { name: name.into(), begins: format!("{name}("), is_traced: false }
-    }
-
-    /// What a view names, with so many samples per pixel where it is traced.
-    pub fn technique(&self, samples: u32) -> String {
-        let samples = if self.is_traced { format!("max_spp: {samples}") } else { String::new() };
-        format!("{}{samples})", self.begins)
+        Column { name: name.into(), technique: format!("{name}()"), is_traced: false }
     }
 }
 
+/// Few paths, so that the grid is done in time: what is looked for is not noise.
+const SAMPLES: u32 = 8;
 const MAX_DEPTH: u32 = 64;
 
 pub fn all() -> Vec<Column> {
     let mut columns = Vec::new();
     for entry in REGISTRY {
         let column = Column::drawn(entry.name);
-        let text = TechniqueText::from_flag("--technique", &column.technique(1)).expect("a name can be read");
+        let text = TechniqueText::from_flag("--technique", &column.technique).expect("a name can be read");
         if Reference::of(&text).expect("it reads without settings").is_none() {
             columns.push(column);
             continue;
         }
         for integrator in variants::<Integrator>() {
             for light in variants::<Light>() {
-                let begins =
-                    format!("{}(integrator: {integrator}, light: {light}, max_depth: {MAX_DEPTH}, ", entry.name);
-                columns.push(Column { name: format!("{integrator} {light}"), begins, is_traced: true });
+                let goal = format!("max_spp: {SAMPLES}, max_depth: {MAX_DEPTH}");
+                columns.push(Column {
+                    name: format!("{integrator} {light}"),
+                    technique: format!("{}(integrator: {integrator}, light: {light}, {goal})", entry.name),
+                    is_traced: true,
+                });
             }
         }
     }

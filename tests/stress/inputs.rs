@@ -135,15 +135,17 @@ fn boundaries(grid: &mut Grid) {
 
 fn lights(grid: &mut Grid) {
     let with = |lamps: Vec<Lamp>| Stage { lamps, ..Stage::default() };
-    let dark = || PANEL.times(0.0);
-    // A panel is seen and casts shadows, dark or not.
-    let (one, other) = (with(vec![SUN, BULB, dark()]), with(vec![PANEL, SKY]));
+    // All of them stand in every picture, dark or not: a panel casts shadows, and paths look for each lamp.
+    let lit = |powers: [f64; 4]| {
+        let lamps = [SUN, BULB, PANEL, SKY].iter().zip(powers);
+        with(lamps.map(|(lamp, power)| lamp.times(power)).collect())
+    };
+    let (one, other) = (lit([1.0, 1.0, 0.0, 0.0]), lit([0.0, 0.0, 1.0, 1.0]));
     let law = Law::SumOf(Box::new(one), Box::new(other));
-    grid.add("lights add up", true, law, with(vec![SUN, BULB, PANEL, SKY]));
+    grid.add("lights add up", true, law, lit([1.0; 4]));
     for (factor, name, often) in [(2f64.powi(20), "2^20", true), (2f64.powi(-40), "2^-40", false)] {
-        let all = [SUN, BULB, PANEL, SKY];
-        let brighter = with(all.iter().map(|lamp| lamp.times(factor)).collect());
-        grid.add(format!("lights times {name}"), often, Law::Times(factor, Box::new(with(all.to_vec()))), brighter);
+        let law = Law::Times(factor, Box::new(lit([1.0; 4])));
+        grid.add(format!("lights times {name}"), often, law, lit([factor; 4]));
     }
     let around = |i: i32, power: f64| {
         let phi = 0.3927 * i as f64;
