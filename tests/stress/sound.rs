@@ -1,10 +1,11 @@
 //! Looks at every value that a plan's steps made: each number is one, and light is not negative.
 
 use diaphane::geometry::mesh::Mesh;
-use diaphane::gpu::{Buffer, Gpu, Images};
+use diaphane::gpu::{Buffer, Format, Gpu, Images};
 use diaphane::image::Image;
 use diaphane::reference::volume::Tracer;
 use diaphane::store::{Key, Made, Plan, Store};
+use half::f16;
 use std::collections::HashSet;
 
 /// Steps that make something else than light, by the beginning of their names: what they make may be negative.
@@ -16,6 +17,9 @@ const SIGNED: [(&str, &str); 6] = [
     ("frame.through", "a depth: where a ray leaves less where it enters"),
     ("sky.light", "directions, beside the light from there"),
 ];
+
+/// Steps whose halves stand for whatever is brighter, too: a sun in a sky's image.
+const SATURATED: [&str; 2] = ["sky.image", "gpu.upload"];
 
 /// Something that must not be: which step made it, where in its value, and what it is.
 #[derive(Clone, Debug, PartialEq)]
@@ -74,7 +78,14 @@ fn search(made: &Made, gpu: Option<&Gpu>) -> Result<Search, Flaw> {
     let may_be_negative = SIGNED.iter().any(|(begins, _)| name.starts_with(begins));
     let mut search = Search { may_be_negative, numbers: 0, found: None };
     if let Some(images) = made.value::<Images>() {
-        let read = images.floats(gpu(), |texel, value| search.look(value.into(), || texel.to_string()));
+        let read = images.floats(gpu(), |texel, value| {
+            // Some devices keep a half that is too large as the largest one, others as infinity: it is wrong on all.
+            let is_half = matches!(images.0[texel.image].shape.format, Format::Rgba16Float | Format::R16Float);
+            let is_largest = is_half && value.abs() >= f16::MAX.to_f32() && !SATURATED.contains(&name);
+            search.look(if is_largest { f64::INFINITY.copysign(value.into()) } else { value.into() }, || {
+                texel.to_string()
+            });
+        });
         read.map_err(|problem| flaw(problem.to_string()))?;
     } else if let Some(buffer) = made.value::<Buffer>() {
         // Bytes as they are in a value that was looked at: words of bits among them.
