@@ -31,18 +31,21 @@ impl Images {
     pub fn floats(&self, gpu: &Gpu, mut each: impl FnMut(Texel, f32)) -> Result<(), Problem> {
         for (image, texture) in self.0.iter().enumerate() {
             let (width, stride) = (texture.shape.width, texture.shape.format.bytes_per_texel());
-            let word = |bytes: &[u8]| f32::from_le_bytes(bytes.try_into().expect("a chunk has 4 bytes"));
-            let half = |bytes: &[u8]| f16::from_le_bytes(bytes.try_into().expect("a chunk has 2 bytes")).to_f32();
-            let (size, read): (usize, &dyn Fn(&[u8]) -> f32) = match texture.shape.format {
-                Format::Rgba32Float | Format::R32Float | Format::Depth32Float => (4, &word),
-                Format::Rgba16Float | Format::R16Float => (2, &half),
+            let size = match texture.shape.format {
+                Format::Rgba32Float | Format::R32Float | Format::Depth32Float => 4,
+                Format::Rgba16Float | Format::R16Float => 2,
                 Format::Rgba32Uint | Format::Rgba8Unorm | Format::Bgra8Unorm => continue,
             };
             let channels = stride / size as u32;
             for layer in 0..texture.shape.layers {
                 for (i, bytes) in gpu.read_layer(texture, layer)?.chunks_exact(size).enumerate() {
                     let (pixel, channel) = (i as u32 / channels, i as u32 % channels);
-                    each(Texel { image, layer, x: pixel % width, y: pixel / width, channel }, read(bytes));
+                    let value = match *bytes {
+                        [a, b, c, d] => f32::from_le_bytes([a, b, c, d]),
+                        [a, b] => f16::from_le_bytes([a, b]).to_f32(),
+                        _ => unreachable!("a chunk is a word or a half"),
+                    };
+                    each(Texel { image, layer, x: pixel % width, y: pixel / width, channel }, value);
                 }
             }
         }

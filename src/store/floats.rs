@@ -24,15 +24,18 @@ impl fmt::Display for Place<'_> {
     }
 }
 
+/// Is told a number and where it stands.
+pub type Each<'a> = dyn FnMut(&Place, f64) + 'a;
+
 /// Tells `each` every f32 and f64 of a value.
-pub fn floats<T: Serialize + ?Sized>(value: &T, each: &mut dyn FnMut(&Place, f64)) {
+pub fn floats<T: Serialize + ?Sized>(value: &T, each: &mut Each) {
     // The only errors are those of a value that refuses to be written down, and no bake's value does.
     value.serialize(&mut Walk { way: Vec::new(), each }).expect("a bake's value can be written down");
 }
 
 struct Walk<'a> {
     way: Vec<Part>,
-    each: &'a mut dyn FnMut(&Place, f64),
+    each: &'a mut Each<'a>,
 }
 
 impl Walk<'_> {

@@ -11,7 +11,7 @@
 //! # Ok::<(), diaphane::problem::Problem>(())
 //! ```
 
-use super::floats::Place;
+use super::floats::Each;
 use super::get::Store;
 use super::plan::{Plan, PlannedStep, Source, Value};
 
@@ -29,7 +29,7 @@ impl<'a> Made<'a> {
 
     /// Tells every floating-point number of a bake's value, whatever its type, with its place: `normals[7][2]`. False for
     /// what is no bake: only those can be written down.
-    pub fn floats(&self, each: &mut dyn FnMut(&Place, f64)) -> bool {
+    pub fn floats(&self, each: &mut Each) -> bool {
         let Source::Bake(_, codec) = &self.step.source else { return false };
         (codec.floats)(self.value, each);
         true

@@ -36,7 +36,7 @@
 //! ```
 
 use super::code;
-use super::floats::{Place, floats};
+use super::floats::{Each, floats};
 use super::key::{Key, SLOT, SlotBytes, Spelling};
 use super::run::Run;
 use crate::problem::Problem;
@@ -110,7 +110,7 @@ pub(super) struct Codec {
     pub encode: fn(&Value) -> Vec<u8>,
     pub decode: fn(&[u8]) -> Option<Value>,
     /// Every number in it, for whoever looks between the steps.
-    pub floats: fn(&Value, &mut dyn FnMut(&Place, f64)),
+    pub floats: fn(&Value, &mut Each),
 }
 
 type RunFn = dyn Fn(&Run) -> Result<Value, Problem> + Send + Sync;
