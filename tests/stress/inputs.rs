@@ -3,6 +3,7 @@
 use crate::meshes;
 use crate::stage::{BULB, Lamp, Medium, PANEL, SKY, SUN, Shape, Stage, WAX};
 use glam::{DVec3, dvec3};
+use std::f64::consts::FRAC_PI_8;
 
 /// What has to hold of a picture, besides that every number on the way to it is one.
 #[derive(Clone)]
@@ -148,7 +149,7 @@ fn lights(grid: &mut Grid) {
         grid.add(format!("lights times {name}"), often, law, lit([factor; 4]));
     }
     let around = |i: i32, power: f64| {
-        let phi = 0.3927 * i as f64;
+        let phi = FRAC_PI_8 * i as f64;
         let position = dvec3(3.0 * phi.cos(), 0.3 * (i % 5) as f64 + 0.5, 3.0 * phi.sin());
         match i % 3 {
             0 => Lamp::Directional { direction: -position, irradiance: power },
