@@ -29,6 +29,8 @@ struct Object {
     roughness_layer: i32,
     // What the object does, as the flags below.
     flags: u32,
+    // From the eye to its middle.
+    distance: f32,
 }
 
 const TRANSLUCENT: u32 = 1u;

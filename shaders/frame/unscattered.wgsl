@@ -30,7 +30,7 @@ fn fragment(in: Vertex, @builtin(front_facing) front: bool) -> @location(0) vec4
     if (object.flags & TRANSLUCENT) == 0u {
         return vec4f(OPAQUE, OPAQUE, OPAQUE, 0.0);
     }
-    // Distances are counted from the object's origin, so that their differences survive as halves.
-    let distance = length(in.position) - length(object.eye_from_object[3].xyz);
+    // Distances are counted from the object's middle, so that their differences survive as halves.
+    let distance = length(in.position) - object.distance;
     return vec4f(object.sigma_t * distance * select(1.0, -1.0, front), 0.0);
 }

@@ -6,7 +6,6 @@ use crate::image::{Display, Image, Tone};
 use crate::problem::Problem;
 use crate::scene::Substance;
 use crate::store::{Plan, Run, Slot, Step};
-use glam::DVec3;
 use serde::Serialize;
 
 /// An optical depth through which less than 1e-8 of the light comes.
@@ -36,8 +35,7 @@ impl Frame<'_> {
         for item in self.items.iter().filter(|item| item.in_view) {
             let Some(Substance::Translucent(medium)) = self.material(item).map(|m| &m.medium) else { continue };
             let sigma_t = medium.sigma_t().min_element() * self.scene.mm_per_unit;
-            let center = item.corners.iter().sum::<DVec3>() / 8.0;
-            let across = 2.0 * item.corners.iter().map(|p| p.distance(center)).fold(0.0, f64::max);
+            let across = 2.0 * item.ball().1;
             // Thin places let light through even where the whole does not: ask for a hundredth of its size.
             let depth = 0.01 * sigma_t * across;
             match depth < THICK || !self.view.skip {

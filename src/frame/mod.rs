@@ -69,6 +69,14 @@ pub(crate) struct Item {
     pub entry: f64,
 }
 
+impl Item {
+    /// Around its corners: middle and radius, world space.
+    fn ball(&self) -> (DVec3, f64) {
+        let middle = self.corners.iter().sum::<DVec3>() / 8.0;
+        (middle, self.corners.iter().map(|p| p.distance(middle)).fold(0.0, f64::max))
+    }
+}
+
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Thing {
     /// The object's place in the scene.
@@ -179,8 +187,7 @@ impl<'a> Frame<'a> {
             .items
             .iter()
             .map(|item| {
-                let center = item.corners.iter().sum::<DVec3>() / 8.0;
-                let radius = item.corners.iter().map(|p| p.distance(center)).fold(0.0, f64::max);
+                let (center, radius) = item.ball();
                 (center.distance(self.view.camera.eye) - radius).max(1e-4 * radius)
             })
             .fold(f64::INFINITY, f64::min);
@@ -220,8 +227,7 @@ impl<'a> Frame<'a> {
     /// Sets how far above an item's surface its shadows are looked up, mm; a tenth of the item at most.
     pub(crate) fn set_entry(&mut self, place: usize, entry_mm: f64) {
         let item = &mut self.items[place];
-        let center = item.corners.iter().sum::<DVec3>() / 8.0;
-        let radius = item.corners.iter().map(|p| p.distance(center)).fold(0.0, f64::max);
+        let (_, radius) = item.ball();
         item.entry = (entry_mm / self.scene.mm_per_unit).min(0.2 * radius);
         self.objects = OnceCell::new();
     }
@@ -252,6 +258,7 @@ impl<'a> Frame<'a> {
 
     fn row(&self, item: &Item, maps: &[surface::Use]) -> tables::Object {
         let eye_from_world = DAffine3::from_translation(-self.view.camera.eye);
+        let (middle, radius) = item.ball();
         let mut row = tables::Object {
             eye_from_object: DMat4::from(eye_from_world * item.world_from_object).as_mat4(),
             color: Vec3::ONE,
@@ -264,6 +271,7 @@ impl<'a> Frame<'a> {
             color_layer: -1,
             roughness_layer: -1,
             flags: 0,
+            distance: middle.distance(self.view.camera.eye) as f32,
         };
         match item.thing {
             Thing::Light(i) => {
@@ -288,7 +296,8 @@ impl<'a> Frame<'a> {
                 }
                 if let Substance::Translucent(medium) = &material.medium {
                     row.flags = tables::TRANSLUCENT;
-                    row.sigma_t = (medium.sigma_t() * self.scene.mm_per_unit).as_vec3();
+                    let densest = DVec3::splat(DENSEST / radius);
+                    row.sigma_t = (medium.sigma_t() * self.scene.mm_per_unit).min(densest).as_vec3();
                 }
             }
         }
@@ -349,6 +358,11 @@ impl<'a> Frame<'a> {
         }))
     }
 }
+
+/// Mean free paths from a thing's middle to its farthest corner, beyond which a medium counts as no denser for light that
+/// goes straight through: a thousandth of that way is opaque by then, and several faces add up within a half float. Larger
+/// ones are infinite there, and the difference of two infinities is no number.
+const DENSEST: f64 = 8000.0;
 
 /// Where the G-buffer keeps what.
 pub(crate) const POSITION: usize = 0;

@@ -28,6 +28,7 @@ uniform! {
         pub color_layer: i32,
         pub roughness_layer: i32,
         pub flags: u32,
+        pub distance: f32,
     }
 }
 

@@ -295,6 +295,11 @@ impl Gpu {
 
     /// The texels of a texture's first layer, row by row, top first.
     pub fn read_texture(&self, texture: &Texture) -> Result<Vec<u8>, Problem> {
+        self.read_layer(texture, 0)
+    }
+
+    /// The texels of one layer of a texture, row by row, top first.
+    pub fn read_layer(&self, texture: &Texture, layer: u32) -> Result<Vec<u8>, Problem> {
         let row = texture.shape.width * texture.shape.format.bytes_per_texel();
         let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let staging = self.device.create_buffer(&wgpu::BufferDescriptor {
@@ -305,7 +310,10 @@ impl Gpu {
         });
         let mut encoder = self.device.create_command_encoder(&Default::default());
         encoder.copy_texture_to_buffer(
-            texture.texture.as_image_copy(),
+            wgpu::TexelCopyTextureInfo {
+                origin: wgpu::Origin3d { x: 0, y: 0, z: layer },
+                ..texture.texture.as_image_copy()
+            },
             wgpu::TexelCopyBufferInfo {
                 buffer: &staging,
                 layout: wgpu::TexelCopyBufferLayout {

@@ -19,12 +19,14 @@
 
 mod bind;
 mod device;
+mod look;
 mod pass;
 mod shader;
 mod texture;
 
 pub use bind::{Bind, Sampler, Uniform};
 pub use device::{Gpu, adapters, how_to_get_an_adapter, is_software};
+pub use look::Texel;
 pub use pass::{Blend, Compute, Cover, Depth, Draw, Fullscreen, Layer, Raster};
 pub use shader::{Shader, Shaders};
 pub use texture::{Format, Shape, Texture};
@@ -37,6 +39,8 @@ pub struct Buffer {
     pub buffer: wgpu::Buffer,
     /// How many of them are content; the buffer itself may be longer.
     pub bytes: u64,
+    /// Which 4-byte words of an element are floats, where a shader made it.
+    is_float: Option<Vec<bool>>,
 }
 
 impl Buffer {
@@ -44,16 +48,16 @@ impl Buffer {
     pub fn new(gpu: &Gpu, bytes: &[u8]) -> Buffer {
         use wgpu::BufferUsages as Usage;
         let usage = Usage::VERTEX | Usage::INDEX | Usage::STORAGE | Usage::COPY_SRC;
-        Buffer { buffer: gpu.buffer(bytes, usage), bytes: bytes.len() as u64 }
+        Buffer { buffer: gpu.buffer(bytes, usage), bytes: bytes.len() as u64, is_float: None }
     }
 
-    fn empty(gpu: &Gpu, bytes: u64) -> Buffer {
+    fn empty(gpu: &Gpu, bytes: u64, is_float: Option<Vec<bool>>) -> Buffer {
         let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: None,
             size: bytes.max(16).next_multiple_of(16),
             usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
             mapped_at_creation: false,
         });
-        Buffer { buffer, bytes }
+        Buffer { buffer, bytes, is_float }
     }
 }

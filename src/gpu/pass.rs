@@ -6,7 +6,7 @@ use super::bind::{self, Bind, Ready};
 use super::device::{Gpu, Pipeline};
 use super::shader::Shader;
 use super::texture::{Format, Shape, Texture};
-use super::{Buffer, Images};
+use super::{Buffer, Images, look};
 use crate::problem::Problem;
 use crate::store::{Key, Run, Slot, Step};
 use serde::Serialize;
@@ -153,7 +153,8 @@ impl Step for Compute {
     fn run(&self, run: &Run) -> Result<Buffer, Problem> {
         let gpu: &Gpu = run.host();
         let count = run.get(self.over).bytes / self.over_stride as u64;
-        let output = Arc::new(Buffer::empty(gpu, count * self.output.1 as u64));
+        let is_float = look::float_words(&self.shader, self.output.0);
+        let output = Arc::new(Buffer::empty(gpu, count * self.output.1 as u64, is_float));
         let wanted = bind::wanted(&self.shader, &["compute"]);
         let ready = bind::pair(gpu, run, &self.shader, &wanted, &self.binds, Some((self.output.0, &output)))?;
         let entries = bind::entries(&wanted, &ready);

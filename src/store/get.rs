@@ -291,6 +291,10 @@ impl Store {
         self.values.is_empty()
     }
 
+    pub(super) fn value(&self, key: &Key) -> Option<&Value> {
+        self.values.get(key)
+    }
+
     /// Drops what no recent plan names.
     fn remember(&mut self, plan: &Plan) {
         let keys: HashSet<Key> = plan.keys().collect();

@@ -6,17 +6,21 @@
 mod code;
 mod disk;
 mod files;
+mod floats;
 mod follow;
 mod get;
 mod key;
+mod made;
 mod plan;
 mod run;
 
 pub use code::fingerprint;
 pub use disk::{Disk, Entry, Swept};
 pub use files::{File, Files};
+pub use floats::Place;
 pub use follow::Follow;
 pub use get::{Finished, Origin, State, Store, Values, Watch};
 pub use key::Key;
+pub use made::Made;
 pub use plan::{Bake, Plan, PlannedStep, Skipped, Slot, Step};
 pub use run::{Cancel, Run};

@@ -36,6 +36,7 @@
 //! ```
 
 use super::code;
+use super::floats::{Each, floats};
 use super::key::{Key, SLOT, SlotBytes, Spelling};
 use super::run::Run;
 use crate::problem::Problem;
@@ -114,6 +115,8 @@ impl<T> std::fmt::Debug for Slot<T> {
 pub(super) struct Codec {
     pub encode: fn(&Value) -> Vec<u8>,
     pub decode: fn(&[u8]) -> Option<Value>,
+    /// Every number in it, for whoever looks between the steps.
+    pub floats: fn(&Value, &mut Each),
 }
 
 type RunFn = dyn Fn(&Run) -> Result<Value, Problem> + Send + Sync;
@@ -176,15 +179,19 @@ impl Plan {
 
     /// Adds a step whose value is kept on disk.
     pub fn bake<S: Bake>(&mut self, step: S) -> Slot<S::Output> {
+        fn own<S: Step>(value: &Value) -> &S::Output {
+            value.downcast_ref().expect("a step's value has the step's type")
+        }
         let codec = Codec {
             encode: |value| {
-                let value = value.downcast_ref::<S::Output>().expect("a step's value has the step's type");
+                let value = own::<S>(value);
                 postcard::to_stdvec(value).expect("a bake's value has fields of known length")
             },
             decode: |bytes| {
                 let (value, rest) = postcard::take_from_bytes::<S::Output>(bytes).ok()?;
                 rest.is_empty().then(|| Arc::new(value) as Value)
             },
+            floats: |value, each| floats(own::<S>(value), each),
         };
         self.place(step, Some(code::fingerprint(S::CODE)), |run| Source::Bake(run, codec))
     }

@@ -17,11 +17,12 @@ use std::f64::consts::PI;
 /// Directions in which the sky is looked for.
 pub(super) const DIRECTIONS: usize = 256;
 
-/// Where one vertex after another sees out: 8 words of 32 directions each.
+/// Where one vertex after another sees out: 8 words of 32 directions each. Places are the world's axes and unit around the
+/// mesh's own origin.
 #[derive(Serialize)]
 pub(super) struct SkyVisibility {
     pub mesh: Slot<Mesh>,
-    pub world_from_object: DAffine3,
+    pub turned: DAffine3,
     pub occluders: Vec<(Slot<Mesh>, DAffine3)>,
 }
 
@@ -37,7 +38,7 @@ impl Step for SkyVisibility {
     fn run(&self, run: &Run) -> Result<Vec<u32>, Problem> {
         let meshes: Vec<_> = self.occluders.iter().map(|(mesh, at)| (run.get(*mesh), *at)).collect();
         let bvh = Bvh::new(&meshes.iter().map(|(mesh, at)| (mesh.as_ref(), *at)).collect::<Vec<_>>());
-        let mesh = run.get(self.mesh).transformed(&self.world_from_object);
+        let mesh = run.get(self.mesh).transformed(&self.turned);
         visibility(&mesh.positions, &mesh.normals, &bvh, DIRECTIONS, &|share| run.tick(share))
     }
 }

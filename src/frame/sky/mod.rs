@@ -89,13 +89,15 @@ impl Frame<'_> {
             );
             return None;
         }
+        // Seen from the item's own place: vertices are f32, and far from the origin they would fall into one another.
+        let here = DAffine3::from_translation(-item.world_from_object.translation);
         let occluders = self
             .items
             .iter()
             .filter(|other| self.is_rigid(other))
-            .map(|other| (other.mesh, other.world_from_object))
+            .map(|other| (other.mesh, here * other.world_from_object))
             .collect();
-        let words = plan.bake(SkyVisibility { mesh: item.mesh, world_from_object: item.world_from_object, occluders });
+        let words = plan.bake(SkyVisibility { mesh: item.mesh, turned: here * item.world_from_object, occluders });
         Some(upload::list(plan, words, "visible directions"))
     }
 
