@@ -115,6 +115,10 @@ impl Case {
         let display = Display { tone: self.scene.view.tone, exposure_ev: self.scene.view.exposure_ev as f32 };
         let mut judged = look.clone();
         judged.view.part = Part::Scattered;
+        let shown = |scene: &Scene, look: &Look| {
+            let drawn = |_: &Plan, _: &[_]| unreachable!("the reference is no contender");
+            render::plan_shown(scene, look, display, shaders, drawn).map(|shown| (shown.plan, shown.picture))
+        };
         let (moved, moment) = super::timing::later(&self.scene, &look);
         let (width, height) = look.view.size;
         let settings = text.ron.strip_prefix(&text.name).unwrap_or_default();
@@ -126,8 +130,8 @@ impl Case {
                 settings: settings.to_string(),
                 size: format!("{width}x{height}"),
             },
-            frame: render::plan_shown(&self.scene, &look, display, shaders)?,
-            next: render::plan_shown(&moved, &moment, display, shaders)?.0,
+            frame: shown(&self.scene, &look)?,
+            next: shown(&moved, &moment)?.0,
             picture: render::plan(&self.scene, &judged, shaders)?,
         }))
     }
