@@ -264,7 +264,8 @@ mod tests {
         };
         let (context, mut panel, mut all) = (egui::Context::default(), Panel::default(), Vec::new());
         for y in (0..600).step_by(4) {
-            let pos = egui::pos2(60.0, y as f32);
+            // Right of where sliders begin, and within every button.
+            let pos = egui::pos2(100.0, y as f32);
             let button = |pressed| {
                 let (button, modifiers) = (egui::PointerButton::Primary, egui::Modifiers::NONE);
                 egui::Event::PointerButton { pos, button, pressed, modifiers }

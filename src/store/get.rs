@@ -171,13 +171,14 @@ impl Store {
         (0..plan.steps().len()).for_each(|index| self.leave_behind(plan, index));
     }
 
-    /// Drops what a step went on from, if it did.
+    /// Drops all that a step that is there went on from.
     fn leave_behind(&mut self, plan: &Plan, index: usize) {
-        let step = &plan.steps()[index];
-        if let Some(earlier) = step.continues
-            && self.values.contains_key(&step.key)
-        {
-            self.values.remove(&plan.steps()[earlier as usize].key);
+        let mut step = &plan.steps()[index];
+        if self.values.contains_key(&step.key) {
+            while let Some(earlier) = step.continues {
+                step = &plan.steps()[earlier as usize];
+                self.values.remove(&step.key);
+            }
         }
     }
 

@@ -2,10 +2,10 @@
 //!
 //! Random walks through the media, refracted and reflected at their boundaries, each free path and each direction drawn as
 //! physics has it: unbiased, in f64. `light: Direct` counts what real-time techniques make: light source, object, eye.
-//! `light: Full` also counts what leaves one place and enters another. Where a material has `layers`, media vary with the depth below the surface: the
-//! distance to its closest point. `integrator: Layered` counts what scatters once between coming in and going out, the truth
-//! of what `Layered` approximates. `integrator: Bssrdf` takes the material's `profile` for
-//! what the medium does, and is what that model makes when nothing else is approximated.
+//! `light: Full` also counts what leaves one place and enters another. Where a material has `layers`, media vary with the
+//! depth below the surface: the distance to its closest point. `integrator: Layered` counts what scatters once between coming
+//! in and going out, the truth of what `Layered` approximates. `integrator: Bssrdf` takes the material's `profile` for what
+//! the medium does, and is what that model makes when nothing else is approximated.
 //!
 //! Costs: seconds to hours. Samples double until the relative standard error of the picture is at most `max_error`, or
 //! `max_spp` is reached; each doubling is kept, so that the same picture goes on where it was. It asks for no adapter. A

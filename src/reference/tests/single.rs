@@ -17,7 +17,7 @@ fn plane_layers_scatter_once_by_their_closed_form() {
         let lamp = sun(DVec3::new((1.0 - cos_i * cos_i).sqrt(), -cos_i, 0.0));
         let eye = DVec3::new(0.0, -cos_o, (1.0 - cos_o * cos_o).sqrt());
         // Inside.
-        let (mu_i, mu_o) = (refracted_cosine(cos_i, ior).unwrap(), refracted_cosine(cos_o, ior).unwrap());
+        let (mu_i, mu_o) = [cos_i, cos_o].map(|cos| refracted_cosine(cos, ior).expect("denser inside")).into();
         let light = DVec3::new((1.0 - mu_i * mu_i).sqrt(), -mu_i, 0.0);
         let path = DVec3::new(0.0, -mu_o, (1.0 - mu_o * mu_o).sqrt());
         let mut through = Rgb::splat((1.0 - fresnel_dielectric(cos_i, ior)) * cos_i / mu_i);
@@ -90,7 +90,7 @@ fn planes_send_light_back_as_it_came() {
             let mut tracer = tracer(vec![(slab, matter)], vec![sun(-from)], None, Light::Direct, 1000);
             tracer.single = single;
             let ray = |_: &mut Random| (DVec3::new(0.1, 10.0, 0.2) + 5.0 * to, -to);
-            let (mean, error) = measure(&tracer, 60_000, ray, |p| p.scattered);
+            let (mean, error) = measure(&tracer, 90_000, ray, |p| p.scattered);
             (mean / from.y, error / from.y)
         };
         let [a, b] = ways;
