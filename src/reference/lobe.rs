@@ -12,6 +12,7 @@ use super::random::Random;
 use super::volume::Tracer;
 use super::world::{Boundary, Matter, Point, Thing};
 use crate::optics::Rgb;
+use crate::scene::Varying;
 use glam::DVec3;
 
 /// Which directions from a point show a lamp, as far as one can guess.
@@ -65,12 +66,16 @@ impl Lobe {
     }
 }
 
-/// The boundary of a thing that may show lamps as lobes.
+/// The boundary of a thing that may show lamps as lobes: none that is smooth all over.
 fn rough(thing: &Thing) -> Option<&Boundary> {
-    match &thing.matter {
-        Matter::Translucent { surface, .. } if surface.ior != 1.0 => Some(surface),
-        _ => None,
-    }
+    let Matter::Translucent { surface, .. } = &thing.matter else { return None };
+    let is_smooth = match surface.roughness {
+        Varying::Constant(roughness) => {
+            Facing { flat: DVec3::Z, normal: DVec3::Z, eta: surface.ior, roughness }.is_smooth()
+        }
+        Varying::Texture(_) => surface.ior == 1.0,
+    };
+    (!is_smooth).then_some(surface)
 }
 
 fn outside(thing: &Thing, surface: &Boundary, point: &Point) -> Facing {

@@ -7,6 +7,7 @@
 //! | [`free_path`] | how far paths and light get in a medium, homogeneous or in layers |
 //! | [`layers`] | which medium a point lies in |
 //! | [`bssrdf`] | the second: the diffusion profile of each material, where light enters and where it leaves |
+//! | `crossing` | what paths do where they meet a surface |
 //! | [`surfaces`] | what surfaces do that paths do not enter |
 //! | [`boundary`] | reflection and refraction, smooth and rough |
 //! | [`refracted`] | lamps without extent, seen from inside through a smooth boundary |
@@ -23,6 +24,7 @@
 
 pub mod boundary;
 pub mod bssrdf;
+mod crossing;
 pub mod film;
 pub mod free_path;
 pub mod layers;
