@@ -75,6 +75,7 @@ impl Tracer {
         (walk.origin, walk.on) = (point.p, Some(point.place));
         if facing.eta == 1.0 {
             walk.lobes = None;
+            walk.density = walk.density.filter(|_| walk.joined_through);
             // Nothing happens to the path, and lamps could be joined through here.
             walk.inside = beyond;
             walk.passed += point.t;
@@ -111,7 +112,8 @@ impl Tracer {
             let is_lit = met.is_some_and(|met| !self.is_emitter(&met));
             if is_lit && self.light == Light::Full && random.unit() < 1.0 - split.reflectance {
                 walk.weight.value *= refracted_share / (1.0 - split.reflectance);
-                (walk.inside, walk.direction, walk.density, walk.counted) = (beyond, to, own, true);
+                (walk.inside, walk.direction, walk.counted) = (beyond, to, true);
+                (walk.density, walk.joined_through) = (own, false);
                 return true;
             }
             // The share that went out does not stay; only for full light it was chosen between.
@@ -152,6 +154,7 @@ impl Tracer {
         walk.weight.value *= bounce.weight;
         (walk.origin, walk.on) = (bounce.p, Some(bounce.place));
         (walk.direction, walk.density, walk.passed) = (bounce.direction, bounce.density, 0.0);
+        walk.joined_through = false;
         walk.weight.value.max_element() > 0.0
     }
 

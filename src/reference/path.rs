@@ -94,6 +94,8 @@ pub struct Walk {
     pub density: Option<f64>,
     /// How far `origin` lies from that vertex, beyond boundaries that do nothing to the path.
     pub passed: f64,
+    /// Whether lamps were joined there through index-matched boundaries, too: to particles they are, to surfaces not.
+    pub joined_through: bool,
     /// Whether what shines along this ray, in the open, was added already.
     pub counted: bool,
     /// The thing in which the path was scattered last and where, as long as it has not met a surface since: there lamps

@@ -238,6 +238,38 @@ fn ways_of_finding_light_share_it_out() {
     }
 }
 
+/// A floor under an area light, with a thing in between that can only be told by its mesh.
+#[test]
+fn what_is_clear_and_index_matched_takes_no_light() {
+    let floor = || {
+        let white = Matter::Opaque { surface: surface(1.0, 0.0), albedo: Rgb::splat(0.8) };
+        (shapes::slab(DVec3::new(4.0, 1.0, 4.0), (1, 1)), white)
+    };
+    let clear = || {
+        let mut mesh = shapes::slab(DVec3::new(8.0, 0.5, 8.0), (1, 1));
+        mesh.positions.iter_mut().for_each(|p| p.y += 2.0);
+        (mesh, translucent(1.0, 0.0, Rgb::ZERO, Rgb::ZERO, 0.0))
+    };
+    let rect = Kind::Rect { center: 4.0 * DVec3::Y, u: 2.0 * DVec3::X, v: 2.0 * DVec3::Z, radiance: Rgb::ONE };
+    let quad = Mesh {
+        positions: [(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)]
+            .map(|(x, z)| glam::Vec3::new(x, 4.0, z))
+            .to_vec(),
+        normals: vec![glam::Vec3::NEG_Y; 4],
+        uvs: Vec::new(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    };
+    let lamp = || vec![Lamp { kind: rect.clone(), shadow: true }];
+    let lit = |things| {
+        let tracer = tracer(things, lamp(), None, Light::Full, 100);
+        let eye = |_: &mut Random| (DVec3::new(3.0, 0.9, 0.0), DVec3::new(-2.5, -0.4, 0.2).normalize());
+        measure(&tracer, 240_000, eye, |p| p.scattered)
+    };
+    let lamp_alone = lit(vec![floor(), (quad.clone(), Matter::Emitter(0))]);
+    let behind = lit(vec![floor(), (quad, Matter::Emitter(0)), clear()]);
+    layers::agree_both("behind what is clear", behind, lamp_alone);
+}
+
 /// A floor and a wall: what one sends out, the other takes in.
 fn corner(matter: &Matter) -> Vec<(Mesh, Matter)> {
     let floor = shapes::slab(DVec3::new(4.0, 1.0, 4.0), (1, 1));

@@ -117,6 +117,7 @@ impl Tracer {
             passed: 0.0,
             weight: Weight::new(random),
             density: None,
+            joined_through: false,
             counted: false,
             lobes: None,
             color: Rgb::ONE,
@@ -248,7 +249,7 @@ impl Tracer {
         let parameter = medium.parameter[walk.weight.hero];
         walk.direction = around(from, -medium.phase.sample(random.unit(), parameter), random.unit());
         let values = phase(walk.direction);
-        (walk.density, walk.passed) = (Some(walk.weight.mixed(values)), 0.0);
+        (walk.density, walk.joined_through, walk.passed) = (Some(walk.weight.mixed(values)), true, 0.0);
         walk.weight.event(values, values);
     }
 
