@@ -10,7 +10,7 @@ use super::light::{Lamp, Ray};
 use super::path::Walk;
 use super::random::Random;
 use super::volume::Tracer;
-use super::world::{Boundary, Matter, Point, Thing};
+use super::world::{Boundary, Matter, Thing};
 use crate::optics::Rgb;
 use crate::scene::Varying;
 use glam::DVec3;
@@ -38,7 +38,7 @@ impl Lobe {
         for _ in 0..2 {
             let point = tracer.world.meet(p, to, f64::INFINITY, None).filter(|point| point.thing() == thing)?;
             let travels = -lamp.ray(point.p)?.direction;
-            let facing = outside(body, surface, &point);
+            let facing = body.outside(surface, &point);
             // The second time from nearer by.
             to = -facing.split(travels).refracted?;
             guess = Some((facing, travels, point.t));
@@ -78,11 +78,6 @@ fn rough(thing: &Thing) -> Option<&Boundary> {
     (!is_smooth).then_some(surface)
 }
 
-fn outside(thing: &Thing, surface: &Boundary, point: &Point) -> Facing {
-    let roughness = thing.roughness(surface, point);
-    Facing { flat: point.flat, normal: point.normal, eta: surface.ior, roughness }
-}
-
 impl Tracer {
     /// A lamp without extent, through the rough boundary of the thing in which a path lies: a direction from there, and
     /// irradiance on a particle, over its density. `own` is the density with which the path would have gone there itself.
@@ -103,7 +98,7 @@ impl Tracer {
             return None;
         }
         let body = &self.world.things[thing];
-        let out = outside(body, rough(body)?, &point);
+        let out = body.outside(rough(body)?, &point);
         let inside = Facing { flat: -out.flat, normal: -out.normal, eta: 1.0 / out.eta, ..out };
         let ray: Ray = lamp.ray(point.p)?;
         if inside.is_smooth() || ray.direction.dot(point.flat) <= 0.0 {

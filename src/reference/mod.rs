@@ -252,14 +252,6 @@ impl Step for BuildTracer {
                 refracted.extend(Refracted::new(&world, i, &lamp.kind, thing));
             }
         }
-        let lamp_of = world
-            .things
-            .iter()
-            .map(|thing| match thing.matter {
-                Matter::Emitter(lamp) => Some(lamp),
-                _ => None,
-            })
-            .collect();
         let sky = self.sky.as_ref().map(|sky| light::Sky {
             scale: sky.scale,
             image: sky.image.map(|image| SkyImage::new(run.get(image), sky.rotation)),
@@ -267,7 +259,7 @@ impl Step for BuildTracer {
         });
         let lamps = self.lamps.clone();
         let BuildTracer { light, max_depth, single, .. } = *self;
-        Ok(Tracer { world, lamps, sky, lamp_of, refracted, light, max_depth, single, joins: true })
+        Ok(Tracer { world, lamps, sky, refracted, light, max_depth, single, joins: true })
     }
 }
 

@@ -4,7 +4,6 @@
 //! A way is drawn at random, and lamps and the sky's image are joined where it begins: the two share out what both find, by
 //! the balance heuristic.
 
-use super::boundary::Facing;
 use super::light::{Lamp, Ray};
 use super::random::Random;
 use super::volume::Tracer;
@@ -41,12 +40,7 @@ impl Tracer {
         if surface.ior == 1.0 || d.dot(point.flat) >= 0.0 {
             return None;
         }
-        let facing = Facing {
-            flat: point.flat,
-            normal: point.normal,
-            eta: surface.ior,
-            roughness: thing.roughness(surface, point),
-        };
+        let facing = thing.outside(surface, point);
         let bounce = |joined: Rgb, direction: DVec3, weight: f64, density: Option<f64>| {
             Some(Bounce { joined, p: point.p, place: point.place, direction, weight: Rgb::splat(weight), density })
         };

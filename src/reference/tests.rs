@@ -32,13 +32,22 @@ fn tracer(things: Vec<(Mesh, Matter)>, lamps: Vec<Lamp>, sky: Option<f64>, light
         (0..world.things.len()).filter_map(move |thing| Refracted::new(world, i, &kind, thing)).collect::<Vec<_>>()
     };
     let refracted = lamps.iter().enumerate().flat_map(beams).collect();
-    let lamp_of = world
-        .things
-        .iter()
-        .map(|thing| if let Matter::Emitter(lamp) = thing.matter { Some(lamp) } else { None })
-        .collect();
     let sky = sky.map(|radiance| light::Sky { scale: Rgb::splat(radiance), image: None, shadow: true });
-    Tracer { world, lamps, sky, lamp_of, refracted, light, max_depth, single: false, joins: true }
+    Tracer { world, lamps, sky, refracted, light, max_depth, single: false, joins: true }
+}
+
+/// A square light at a height, of a half-edge, that shines down; and its mesh.
+fn light_above(height: f64, half: f64) -> (Kind, Mesh) {
+    // cross(x, z) = -y.
+    let (u, v) = (half * DVec3::X, half * DVec3::Z);
+    let corners = [-u - v, u - v, u + v, v - u];
+    let mesh = Mesh {
+        positions: corners.map(|p| (height * DVec3::Y + p).as_vec3()).to_vec(),
+        normals: vec![glam::Vec3::NEG_Y; 4],
+        uvs: Vec::new(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    };
+    (Kind::Rect { center: height * DVec3::Y, u, v, radiance: Rgb::ONE }, mesh)
 }
 
 fn sun(direction: DVec3) -> Lamp {
@@ -211,15 +220,7 @@ fn opaque_things_are_lambertian() {
 #[test]
 fn ways_of_finding_light_share_it_out() {
     let matter = |ior: f64, roughness: f64| translucent(ior, roughness, Rgb::splat(0.5), Rgb::splat(3.0), 0.5);
-    let rect = Kind::Rect { center: 4.0 * DVec3::Y, u: 2.0 * DVec3::X, v: 2.0 * DVec3::Z, radiance: Rgb::ONE };
-    // cross(x, z) = -y: it shines down.
-    let corners = [(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)];
-    let quad = Mesh {
-        positions: corners.map(|(x, z)| glam::Vec3::new(x, 4.0, z)).to_vec(),
-        normals: vec![glam::Vec3::NEG_Y; 4],
-        uvs: Vec::new(),
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-    };
+    let (rect, quad) = light_above(4.0, 2.0);
     let lamp = Lamp { kind: rect, shadow: true };
     let eye = |random: &mut Random| {
         let (a, b) = random.pair();
@@ -250,15 +251,7 @@ fn what_is_clear_and_index_matched_takes_no_light() {
         mesh.positions.iter_mut().for_each(|p| p.y += 2.0);
         (mesh, translucent(1.0, 0.0, Rgb::ZERO, Rgb::ZERO, 0.0))
     };
-    let rect = Kind::Rect { center: 4.0 * DVec3::Y, u: 2.0 * DVec3::X, v: 2.0 * DVec3::Z, radiance: Rgb::ONE };
-    let quad = Mesh {
-        positions: [(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)]
-            .map(|(x, z)| glam::Vec3::new(x, 4.0, z))
-            .to_vec(),
-        normals: vec![glam::Vec3::NEG_Y; 4],
-        uvs: Vec::new(),
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-    };
+    let (rect, quad) = light_above(4.0, 2.0);
     let lamp = || vec![Lamp { kind: rect.clone(), shadow: true }];
     let lit = |things| {
         let tracer = tracer(things, lamp(), None, Light::Full, 100);

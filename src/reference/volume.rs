@@ -35,8 +35,6 @@ pub struct Tracer {
     pub world: World,
     pub lamps: Vec<Lamp>,
     pub sky: Option<Sky>,
-    /// Which lamp each emitter of the world is.
-    pub lamp_of: Vec<Option<usize>>,
     pub refracted: Vec<Refracted>,
     pub light: Light,
     pub max_depth: u32,
@@ -165,7 +163,7 @@ impl Tracer {
         }
         for (i, lamp) in self.lamps.iter().enumerate().filter(|(_, lamp)| lamp.has_extent()) {
             let seen = match lamp.shadow {
-                true => met.filter(|point| self.lamp_of[point.thing()] == Some(i)).map(|point| point.t * d),
+                true => met.filter(|point| self.world.things[point.thing()].lamp() == Some(i)).map(|point| point.t * d),
                 false => lamp.meet(p, d),
             };
             if let Some((radiance, own)) = seen.and_then(|to| lamp.radiance(to + passed * d)) {
@@ -176,11 +174,11 @@ impl Tracer {
     }
 
     pub(super) fn is_emitter(&self, point: &Point) -> bool {
-        matches!(self.world.things[point.thing()].matter, Matter::Emitter(_))
+        self.world.things[point.thing()].lamp().is_some()
     }
 
     pub(super) fn emitted(&self, point: &Point, to: DVec3) -> Option<(Rgb, f64)> {
-        let lamp = self.lamp_of[point.thing()]?;
+        let lamp = self.world.things[point.thing()].lamp()?;
         self.lamps[lamp].radiance(to)
     }
 

@@ -1,5 +1,6 @@
 //! The scene as rays see it: every triangle of every visible object and area light in world space.
 
+use super::boundary::Facing;
 use super::bssrdf::Bssrdf;
 use super::layers::{Layers, Strata};
 use crate::geometry::bvh::{Bvh, Hit};
@@ -143,6 +144,20 @@ impl Thing {
         let center = 0.5 * (min + max);
         let radius = corners().map(|p| p.distance(center)).fold(0.0, f64::max);
         Ball { center, radius: 1.0001 * radius }
+    }
+
+    /// Its place in the scene's list of lights, if it is one.
+    pub fn lamp(&self) -> Option<usize> {
+        match self.matter {
+            Matter::Emitter(lamp) => Some(lamp),
+            _ => None,
+        }
+    }
+
+    /// A boundary of it, seen from outside.
+    pub fn outside(&self, surface: &Boundary, point: &Point) -> Facing {
+        let roughness = self.roughness(surface, point);
+        Facing { flat: point.flat, normal: point.normal, eta: surface.ior, roughness }
     }
 
     /// Whether light changes its direction where it enters.

@@ -42,15 +42,7 @@ fn plane_layers_scatter_once_by_their_closed_form() {
 #[test]
 fn single_scattering_is_the_beginning_of_all_scattering() {
     let [skin, flesh] = two_media();
-    let rect = Kind::Rect { center: 1.6 * DVec3::Y, u: 3.0 * DVec3::X, v: 3.0 * DVec3::Z, radiance: Rgb::ONE };
-    // cross(x, z) = -y: it shines down.
-    let corners = [(-3.0, -3.0), (3.0, -3.0), (3.0, 3.0), (-3.0, 3.0)];
-    let quad = Mesh {
-        positions: corners.map(|(x, z)| glam::Vec3::new(x, 1.6, z)).to_vec(),
-        normals: vec![glam::Vec3::NEG_Y; 4],
-        uvs: Vec::new(),
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-    };
+    let (rect, quad) = light_above(1.6, 3.0);
     let point = Kind::Point { position: DVec3::new(0.5, 1.5, 2.0), intensity: Rgb::ONE };
     for (ior, layers) in [(1.0, 1), (1.3, 1), (1.3, 0)] {
         for (kind, max_depth, paths) in [(Some(&point), 2, 60_000), (None, 3, 60_000), (Some(&rect), 3, 100_000)] {
