@@ -1,6 +1,6 @@
 //! Functions of the thickness as spherical harmonics: c_i = ∫ f(w) Y_i(w) dw [Tomaszewska2012, eq. 1].
 
-use super::{Lengths, STEPS, Span, antipodal_directions};
+use super::{Lengths, Span, antipodal_directions};
 use crate::optics::sh::sh_basis;
 use crate::problem::{Problem, Tick};
 use glam::Vec3;
@@ -26,14 +26,16 @@ impl Harmonics {
     }
 }
 
-/// Projects `CHANNELS` functions of a ray's length, each times `weight` of the cosine between ray and vertex normal.
-/// `response` is told shares of the diagonal, at most 65536 of them.
+/// A vertex normal for each vertex, and a function of the cosine between it and a direction.
+pub type Facing<'a> = (&'a [Vec3], &'a (dyn Fn(f64) -> f64 + Sync));
+
+/// Projects `CHANNELS` functions of what a ray crosses, each times a weight of how the surface faces the ray, if there is
+/// one. `response` is asked once for each length that is kept apart.
 pub fn project<const CHANNELS: usize>(
     lengths: &Lengths,
-    normals: &[Vec3],
+    facing: Option<Facing>,
     bands: usize,
     response: impl Fn(Span) -> [f64; CHANNELS],
-    weight: impl Fn(f64) -> f64 + Sync,
     tick: Tick,
 ) -> Result<Harmonics, Problem> {
     let directions = antipodal_directions(lengths.directions);
@@ -42,10 +44,8 @@ pub fn project<const CHANNELS: usize>(
         .iter()
         .map(|d| sh_basis(*d, bands).into_iter().map(|y| (solid_angle * y) as f32).collect())
         .collect();
-    // Lengths are kept in so few steps that the response of each can be known.
     let responses: Vec<[f32; CHANNELS]> =
         (0..=u16::MAX).map(|packed| response(Span::unpack(packed)).map(|r| r as f32)).collect();
-    debug_assert!(responses.len() == 2 * (STEPS as usize + 1));
     let count = bands * bands;
     let mut values = vec![0.0f32; lengths.vertices * CHANNELS * count];
     const VERTICES: usize = 64;
@@ -53,15 +53,14 @@ pub fn project<const CHANNELS: usize>(
     values.par_chunks_mut(VERTICES * CHANNELS * count).enumerate().try_for_each(|(chunk, values)| {
         for (i, sums) in values.chunks_exact_mut(CHANNELS * count).enumerate() {
             let vertex = chunk * VERTICES + i;
-            let normal = normals[vertex].as_dvec3();
             for (k, basis) in bases.iter().enumerate() {
                 let response = responses[lengths.packed[k * lengths.vertices + vertex] as usize];
                 if response == [0.0; CHANNELS] {
                     continue;
                 }
-                let weight = weight(normal.dot(directions[k])) as f32;
+                let weight = facing.map_or(1.0, |(normals, weight)| weight(normals[vertex].as_dvec3().dot(directions[k])));
                 for (sums, response) in sums.chunks_exact_mut(count).zip(response) {
-                    let value = weight * response;
+                    let value = weight as f32 * response;
                     sums.iter_mut().zip(basis).for_each(|(sum, y)| *sum += value * y);
                 }
             }

@@ -10,9 +10,9 @@ fn run(mesh: &Mesh) -> Lengths {
     lengths(mesh, N, &|_| Ok(())).unwrap()
 }
 
-fn thickness(lengths: &Lengths, normals: &[Vec3], bands: usize) -> Harmonics {
+fn thickness(lengths: &Lengths, bands: usize) -> Harmonics {
     let diagonal = lengths.diagonal;
-    project(lengths, normals, bands, |span| [span.share * diagonal], |_| 1.0, &|_| Ok(())).unwrap()
+    project(lengths, None, bands, |span| [span.share * diagonal], &|_| Ok(())).unwrap()
 }
 
 /// One step of what is kept, as a length.
@@ -30,25 +30,28 @@ fn ball(subdivisions: u32) -> (Mesh, f64) {
 #[test]
 fn a_sphere_is_as_thick_as_its_chords() {
     let (mesh, radius) = ball(5);
-    let lengths = run(&mesh);
+    let (lengths, mut sum) = (run(&mesh), 0.0);
     for (v, p) in mesh.positions.iter().enumerate() {
         for (k, d) in antipodal_directions(N).iter().enumerate() {
             let expected = 2.0 * radius * (-p.as_dvec3().dot(*d)).max(0.0);
-            assert!((lengths.at(v, k).share * lengths.diagonal - expected).abs() < 6e-3, "{v} {k}");
+            let error = (lengths.at(v, k).share * lengths.diagonal - expected).abs();
+            // A ray that grazes a facet is longer or shorter by the facet.
+            assert!(error < 0.06, "{v} {k}: {error}");
+            sum += error;
         }
     }
+    assert!(sum < 2e-3 * (N * mesh.positions.len()) as f64, "{sum}");
 }
 
 /// h_l of c_lm = h_l Y_lm(-n), for radius 1; 0 for odd l from 3 on.
 const CLOSED: [f64; 8] =
     [2.0 * PI, 4.0 * PI / 3.0, PI / 2.0, 0.0, -PI / 12.0, 0.0, PI / 32.0, 0.0];
 
-#[test]
-fn a_spheres_coefficients_have_their_closed_form_and_odd_bands_vanish() {
+/// The rms error of the first 25 coefficients of a sphere, and the largest error in each band.
+fn error_on_a_sphere(directions: usize) -> (f64, [f64; 8]) {
     let (mesh, radius) = ball(5);
-    let (lengths, mut worst) = (run(&mesh), [0.0f64; 8]);
-    let found = thickness(&lengths, &mesh.normals, 8);
-    let (mut sum, mut count) = (0.0, 0);
+    let found = thickness(&lengths(&mesh, directions, &|_| Ok(())).unwrap(), 8);
+    let (mut sum, mut count, mut worst) = (0.0, 0, [0.0f64; 8]);
     for (v, n) in mesh.normals.iter().enumerate() {
         let y = sh_basis(-n.as_dvec3(), 8);
         for (l, worst) in worst.iter_mut().enumerate() {
@@ -62,12 +65,18 @@ fn a_spheres_coefficients_have_their_closed_form_and_odd_bands_vanish() {
             }
         }
     }
-    let rms = (sum / f64::from(count)).sqrt();
-    println!("rms error of 25 coefficients {rms:.5}, the largest by band {worst:.4?}, of {:.3}", CLOSED[0] * 0.282);
-    assert!(rms < 0.004, "{rms}");
-    assert!(worst[..5].iter().all(|error| *error < 0.02) && worst.iter().all(|error| *error < 0.035), "{worst:?}");
-    // It would be noticed: a sphere that is a fiftieth larger.
-    assert!(0.02 * CLOSED[0] * 0.282 > 2.0 * worst[0]);
+    ((sum / f64::from(count)).sqrt(), worst)
+}
+
+#[test]
+fn a_spheres_coefficients_have_their_closed_form_and_odd_bands_vanish() {
+    let largest = CLOSED[0] * (0.25 / PI).sqrt();
+    for (directions, bound, by_band) in [(N, 0.006, 0.025), (1024, 0.003, 0.01)] {
+        let (rms, worst) = error_on_a_sphere(directions);
+        println!("{directions} directions: rms {:.4}, the largest by band {:.4?}", rms / largest, worst.map(|w| w / largest));
+        assert!(rms < bound * largest, "{directions}: {rms}");
+        assert!(worst[..5].iter().all(|error| *error < by_band * largest), "{directions}: {worst:?}");
+    }
 }
 
 #[test]
@@ -102,40 +111,44 @@ fn lines_meet_what_rays_meet() {
             pieces[(swept.len() / 2).min(5)] += 1;
             assert!(swept.len().is_multiple_of(2) && swept.iter().map(|c| c.leaves).sum::<i32>() == 0);
             for (one, other) in solid.both_ways(t, &mut swept).iter().zip(solid.both_ways(0.0, &mut traced)) {
-                assert!((one.share - other.share).abs() < 1e-5, "{v} {line}: {one:?} {other:?}");
+                // The hierarchy knows corners to f32.
+                assert!((one.share - other.share).abs() < 1e-4, "{v} {line}: {one:?} {other:?}");
             }
         }
     }
     assert!(pieces[3..].iter().sum::<usize>() > 1000, "lines cross the knot once and again: {pieces:?}");
 }
 
-/// Coefficients of what a mesh is turned into.
 #[test]
 fn it_turns_and_grows_with_the_mesh() {
     let mesh = shapes::torus(1.0, 0.45, (40, 20));
-    let still = thickness(&run(&mesh), &mesh.normals, 5);
+    let still = thickness(&run(&mesh), 5);
     for scale in [1.0, 2f64.powi(-60), 2f64.powi(60)] {
         let grown = mesh.transformed(&DAffine3::from_scale(DVec3::splat(scale)));
-        let found = thickness(&run(&grown), &mesh.normals, 5);
+        let found = thickness(&run(&grown), 5);
         let same = |(a, b): (&f32, &f32)| (f64::from(*a) / scale - f64::from(*b)).abs() < 1e-6;
         assert!(found.values.iter().zip(&still.values).all(same), "{scale}");
     }
-    // A quarter turn about z is exact, and changes the signs and places of coefficients only; the directions are others.
+    // Turned, the directions are others: what differs is the noise of the quadrature, and falls with their number.
     let turn = DMat3::from_quat(DQuat::from_rotation_x(0.7) * DQuat::from_rotation_z(1.9));
     let turned = mesh.transformed(&DAffine3::from_mat3(turn));
-    let found = thickness(&run(&turned), &turned.normals, 5);
-    let (mut apart, mut most) = (0.0f64, 0.0f64);
-    for v in 0..mesh.positions.len() {
-        for d in antipodal_directions(40) {
-            let value = |c: &[f32], d: DVec3| -> f64 {
-                sh_basis(d, 5).iter().zip(c).map(|(y, c)| y * f64::from(*c)).sum()
-            };
-            let (a, b) = (value(still.at(v, 0), d), value(found.at(v, 0), turn * d));
-            (apart, most) = (apart.max((a - b).abs()), most.max(a.abs()));
+    let apart = |directions: usize| {
+        let [still, turned] =
+            [&mesh, &turned].map(|mesh| thickness(&lengths(mesh, directions, &|_| Ok(())).unwrap(), 5));
+        let value =
+            |c: &[f32], d: DVec3| -> f64 { sh_basis(d, 5).iter().zip(c).map(|(y, c)| y * f64::from(*c)).sum() };
+        let (mut apart, mut whole) = (0.0f64, 0.0f64);
+        for v in 0..mesh.positions.len() {
+            for d in antipodal_directions(40) {
+                let (a, b) = (value(still.at(v, 0), d), value(turned.at(v, 0), turn * d));
+                (apart, whole) = (apart + (a - b).powi(2), whole + a * a);
+            }
         }
-    }
-    println!("turned: {apart:.4} apart, of {most:.3}");
-    assert!(apart < 0.06 * most, "{apart} of {most}");
+        (apart / whole).sqrt()
+    };
+    let (few, many) = (apart(N), apart(2048));
+    println!("turned: {few:.4} apart, with 2048 directions {many:.4}");
+    assert!(few < 0.08 && many < 0.4 * few, "{few} {many}");
 }
 
 #[test]
@@ -192,7 +205,7 @@ fn whatever_the_mesh_lengths_are_lengths() {
                 assert!((0.0..=1.0).contains(&share));
             }
         }
-        let found = thickness(&lengths, &mesh.normals, 3);
+        let found = thickness(&lengths, 3);
         assert!(found.values.iter().all(|c| c.is_finite()));
     }
 }
@@ -222,5 +235,5 @@ fn threads_do_not_matter_and_interruptions_do() {
     assert_eq!(pool.install(|| run(&knot)), run(&knot));
     let stop: Tick = &|_| Err(Problem::files("enough"));
     assert!(lengths(&knot, N, stop).is_err());
-    assert!(project(&run(&knot), &knot.normals, 3, |_| [1.0], |_| 1.0, stop).is_err());
+    assert!(project(&run(&knot), None, 3, |_| [1.0], stop).is_err());
 }
