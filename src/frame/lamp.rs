@@ -80,7 +80,8 @@ impl<'a> Surface<'a> {
         if !super::Frame::casts(lamp.light) {
             return Ok(None);
         }
-        let may_hide = |other: &super::Item| !std::ptr::eq(other, item) && lies_before(lamp.light, &other.corners, &item.corners);
+        let may_hide =
+            |other: &super::Item| !std::ptr::eq(other, item) && lies_before(lamp.light, &other.corners, &item.corners);
         if frame.view.skip && !frame.casters(lamp.place).any(may_hide) {
             let what = format!("what others take of the light of `{}` on its way into `{}`", lamp.name, member.name);
             plan.skip(what, "nothing lies between them");
@@ -151,7 +152,8 @@ mod tests {
 
     #[test]
     fn what_lies_beside_or_behind_hides_nothing() {
-        let cube = |at: DVec3| std::array::from_fn(|i| at + DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64));
+        let cube =
+            |at: DVec3| std::array::from_fn(|i| at + DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64));
         let kind = LightKind::Directional { direction: DVec3::NEG_Y, irradiance: DVec3::ONE };
         let sun = Light { name: "sun".into(), shadow: true, enabled: true, kind };
         let here = cube(DVec3::ZERO);

@@ -133,8 +133,7 @@ mod tests {
         let beer = Response::Beer { sigma: Rgb::new(0.1, 1.0, 3.0) };
         for response in [Response::Slab { medium, ior: 1.4 }, beer, Response::Linear { max_thickness: 7.0 }] {
             let Bind::Data { bytes, .. } = response.table(10.0) else { panic!("a table is data") };
-            let rows: Vec<f32> =
-                bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
+            let rows: Vec<f32> = bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
             let function = response.function();
             for i in 0..1000 {
                 let share = i as f64 / 1000.0;

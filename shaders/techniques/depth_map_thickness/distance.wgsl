@@ -16,6 +16,6 @@ fn distance_from_lamp(point: vec3f, i: i32) -> f32 {
     if lamp.kind == DIRECTIONAL {
         return measure.diagonal - dot(point - measure.middle, lamp.position);
     }
-    let from = light_sample(lamp, i);
-    return measure.diagonal + length(point - from) - length(measure.middle - from);
+    let place = light_sample(lamp, i);
+    return measure.diagonal + length(point - place) - length(measure.middle - place);
 }

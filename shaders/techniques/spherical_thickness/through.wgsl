@@ -80,8 +80,10 @@ fn compute(@builtin(global_invocation_id) id: vec3u) {
 #if THICKNESS
         var left = most * transmittance(max(0.0, sum(i * series.words)));
 #else
-        let first = 3u * i * series.words;
-        let found = vec3f(sum(first), sum(first + series.words), sum(first + 2u * series.words));
+        var found = vec3f(0.0);
+        for (var channel = 0u; channel < 3u; channel++) {
+            found[channel] = sum((3u * i + channel) * series.words);
+        }
         var left = clamp(found, vec3f(0.0), vec3f(most));
 #endif
 #if SHADOWS

@@ -156,9 +156,10 @@ impl<'a> Solid<'a> {
         used.sort_unstable();
         used.dedup();
         let places = || used.iter().map(|&v| mesh.positions[v as usize].as_dvec3());
-        let (min, max) = places()
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), p: DVec3| (min.min(p), max.max(p)));
-        let (center, diagonal) = if used.is_empty() { (DVec3::ZERO, 0.0) } else { (0.5 * (min + max), min.distance(max)) };
+        let (min, max) =
+            places().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), p: DVec3| (min.min(p), max.max(p)));
+        let (center, diagonal) =
+            if used.is_empty() { (DVec3::ZERO, 0.0) } else { (0.5 * (min + max), min.distance(max)) };
         let scale = if diagonal > 0.0 { diagonal } else { 1.0 };
         let points: Vec<DVec3> = mesh.positions.iter().map(|p| (p.as_dvec3() - center) / scale).collect();
         let sixfold = |[a, b, c]: &[u32; 3]| {

@@ -58,7 +58,8 @@ pub fn project<const CHANNELS: usize>(
                 if response == [0.0; CHANNELS] {
                     continue;
                 }
-                let weight = facing.map_or(1.0, |(normals, weight)| weight(normals[vertex].as_dvec3().dot(directions[k])));
+                let weight =
+                    facing.map_or(1.0, |(normals, weight)| weight(normals[vertex].as_dvec3().dot(directions[k])));
                 for (sums, response) in sums.chunks_exact_mut(count).zip(response) {
                     let value = weight as f32 * response;
                     sums.iter_mut().zip(basis).for_each(|(sum, y)| *sum += value * y);

@@ -46,8 +46,7 @@ impl<'a> Sweep<'a> {
         let (a, b) = line.any_orthonormal_pair();
         // Seen along the line, what turns counter-clockwise looks ahead.
         let (a, b) = if a.cross(b).dot(line) > 0.0 { (a, b) } else { (b, a) };
-        let points: Vec<(DVec2, f64)> =
-            points.iter().map(|p| (DVec2::new(p.dot(a), p.dot(b)), p.dot(line))).collect();
+        let points: Vec<(DVec2, f64)> = points.iter().map(|p| (DVec2::new(p.dot(a), p.dot(b)), p.dot(line))).collect();
         let place = |v: u32| points[v as usize].0;
         let bounds = |t: &[u32; 3]| {
             let [a, b, c] = t.map(place);

@@ -44,8 +44,7 @@ fn a_sphere_is_as_thick_as_its_chords() {
 }
 
 /// h_l of c_lm = h_l Y_lm(-n), for radius 1; 0 for odd l from 3 on.
-const CLOSED: [f64; 8] =
-    [2.0 * PI, 4.0 * PI / 3.0, PI / 2.0, 0.0, -PI / 12.0, 0.0, PI / 32.0, 0.0];
+const CLOSED: [f64; 8] = [2.0 * PI, 4.0 * PI / 3.0, PI / 2.0, 0.0, -PI / 12.0, 0.0, PI / 32.0, 0.0];
 
 /// The rms error of the first 25 coefficients of a sphere, and the largest error in each band.
 fn error_on_a_sphere(directions: usize) -> (f64, [f64; 8]) {
@@ -73,7 +72,11 @@ fn a_spheres_coefficients_have_their_closed_form_and_odd_bands_vanish() {
     let largest = CLOSED[0] * (0.25 / PI).sqrt();
     for (directions, bound, by_band) in [(N, 0.006, 0.025), (1024, 0.003, 0.01)] {
         let (rms, worst) = error_on_a_sphere(directions);
-        println!("{directions} directions: rms {:.4}, the largest by band {:.4?}", rms / largest, worst.map(|w| w / largest));
+        println!(
+            "{directions} directions: rms {:.4}, the largest by band {:.4?}",
+            rms / largest,
+            worst.map(|w| w / largest)
+        );
         assert!(rms < bound * largest, "{directions}: {rms}");
         assert!(worst[..5].iter().all(|error| *error < by_band * largest), "{directions}: {worst:?}");
     }
@@ -135,8 +138,7 @@ fn it_turns_and_grows_with_the_mesh() {
     let apart = |directions: usize| {
         let [still, turned] =
             [&mesh, &turned].map(|mesh| thickness(&lengths(mesh, directions, &|_| Ok(())).unwrap(), 5));
-        let value =
-            |c: &[f32], d: DVec3| -> f64 { sh_basis(d, 5).iter().zip(c).map(|(y, c)| y * f64::from(*c)).sum() };
+        let value = |c: &[f32], d: DVec3| -> f64 { sh_basis(d, 5).iter().zip(c).map(|(y, c)| y * f64::from(*c)).sum() };
         let (mut apart, mut whole) = (0.0f64, 0.0f64);
         for v in 0..mesh.positions.len() {
             for d in antipodal_directions(40) {
@@ -194,9 +196,15 @@ fn whatever_the_mesh_lengths_are_lengths() {
     soup.positions.push(vec3(1e9, -1e9, 1e9));
     soup.normals.push(Vec3::Y);
     let flat = |s: DVec3| sphere.transformed(&DAffine3::from_scale(s));
-    let one = Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y], normals: vec![Vec3::Z; 3], uvs: vec![], triangles: vec![[0, 1, 2]] };
+    let one = Mesh {
+        positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+        normals: vec![Vec3::Z; 3],
+        uvs: vec![],
+        triangles: vec![[0, 1, 2]],
+    };
     let point = Mesh { positions: vec![Vec3::ONE; 3], ..one.clone() };
-    let hard = [open, soup, flat(DVec3::new(1e-6, 1.0, 1e-6)), flat(DVec3::new(1.0, 1.0, 0.0)), one, point, Mesh::default()];
+    let hard =
+        [open, soup, flat(DVec3::new(1e-6, 1.0, 1e-6)), flat(DVec3::new(1.0, 1.0, 0.0)), one, point, Mesh::default()];
     for mesh in hard {
         let lengths = run(&mesh);
         for v in 0..mesh.positions.len() {

@@ -79,7 +79,10 @@ impl Step for TransmittanceSeries {
         "thickness.transmittance"
     }
     fn about(&self) -> String {
-        format!("what comes through from everywhere, as {} a channel", counted(self.bands * self.bands, "spherical harmonic"))
+        format!(
+            "what comes through from everywhere, as {} a channel",
+            counted(self.bands * self.bands, "spherical harmonic")
+        )
     }
     fn run(&self, run: &Run) -> Result<Harmonics, Problem> {
         let (lengths, mesh) = (run.get(self.lengths), run.get(self.mesh));
@@ -96,8 +99,12 @@ impl Step for TransmittanceSeries {
 }
 
 impl Bake for TransmittanceSeries {
-    const CODE: &'static [&'static str] =
-        &["src/geometry/thickness/", "src/optics/", "src/techniques/attenuation.rs", "src/techniques/spherical_thickness/bake.rs"];
+    const CODE: &'static [&'static str] = &[
+        "src/geometry/thickness/",
+        "src/optics/",
+        "src/techniques/attenuation.rs",
+        "src/techniques/spherical_thickness/bake.rs",
+    ];
 }
 
 /// 4-byte words that hold the coefficients of a vertex and channel as halves.
@@ -175,8 +182,8 @@ mod tests {
     use super::*;
     use crate::geometry::shapes;
     use crate::geometry::thickness::antipodal_directions;
-    use crate::optics::medium::Medium;
     use crate::optics::Rgb;
+    use crate::optics::medium::Medium;
     use crate::optics::sh::sh_basis;
 
     /// As the shader sums them up, given each coefficient's number.
@@ -189,7 +196,8 @@ mod tests {
         let mesh = shapes::torus_knot(2, 3, 1.0, 0.3, (60, 10));
         let lengths = thickness::lengths(&mesh, 256, &|_| Ok(())).unwrap();
         for bands in [2, 5, 8] {
-            let found = project(&lengths, None, bands, |span| [(-20.0 * span.share).exp(), span.share], &|_| Ok(())).unwrap();
+            let found =
+                project(&lengths, None, bands, |span| [(-20.0 * span.share).exp(), span.share], &|_| Ok(())).unwrap();
             let halves = halves(&found);
             let (mut worst, mut most) = (0.0f64, 0.0f64);
             for v in (0..mesh.positions.len()).step_by(7) {
@@ -216,7 +224,8 @@ mod tests {
         for density in [1e-3, 0.1, 1.0, 10.0, 1e3] {
             let medium = Medium::coefficients(Rgb::ZERO, Rgb::splat(density), Rgb::ZERO);
             let left = Response::Slab { medium, ior: 1.4 }.function();
-            let response = |span: thickness::Span| if span.inwards { [left(span.share * lengths.diagonal).x] } else { [0.0] };
+            let response =
+                |span: thickness::Span| if span.inwards { [left(span.share * lengths.diagonal).x] } else { [0.0] };
             let found = project(&lengths, Some((&mesh.normals, &behind)), 1, response, &|_| Ok(())).unwrap();
             let shares = found.values.iter().map(|c| (4.0 / PI).sqrt() * f64::from(*c));
             let most = shares.fold(0.0, f64::max);

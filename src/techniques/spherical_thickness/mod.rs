@@ -43,7 +43,7 @@ use super::{Scattered, Technique};
 use crate::frame::{Lamp, Member, Surface};
 use crate::gpu::{Bind, Blend, Buffer, Compute, Format, Layer, Raster};
 use crate::problem::{Problem, counted};
-use crate::scene::{Material, TechniqueText};
+use crate::scene::TechniqueText;
 use crate::store::{Plan, Slot};
 use crate::uniform;
 use bake::{Halves, Kept, Lengths, ThicknessSeries, TransmittanceSeries, words};
@@ -230,7 +230,8 @@ impl SphericalThickness {
             let (weights, bands) = self.weights(plan, surface, member, &lamp);
             let quarter = |i: usize| Vec4::from_array(std::array::from_fn(|l| weights[i + l] as f32));
             let series = Series { low: quarter(0), high: quarter(4), bands: bands as u32, words };
-            let (mut flags, mut binds) = (Vec::new(), vec![("series", Bind::uniform(&series)), ("lamp", lamp.bind.clone())]);
+            let (mut flags, mut binds) =
+                (Vec::new(), vec![("series", Bind::uniform(&series)), ("lamp", lamp.bind.clone())]);
             binds.extend([("positions", Bind::Buffer(baked.positions)), ("normals", Bind::Buffer(baked.normals))]);
             if self.is_balanced() {
                 flags.push("BALANCED");
@@ -252,7 +253,12 @@ impl SphericalThickness {
             }
             sum = Some(plan.add(Compute {
                 name: "spherical_thickness.through",
-                about: format!("what `{}` sends through `{}`, {}", lamp.name, member.name, counted(bands * bands, "coefficient")),
+                about: format!(
+                    "what `{}` sends through `{}`, {}",
+                    lamp.name,
+                    member.name,
+                    counted(bands * bands, "coefficient")
+                ),
                 shader: surface.shader("techniques/spherical_thickness/through.wgsl", &flags)?,
                 output: ("through", 16),
                 over: baked.normals,
@@ -266,7 +272,8 @@ impl SphericalThickness {
 
 impl Technique for SphericalThickness {
     fn plan(&self, plan: &mut Plan, surface: &Surface) -> Result<Scattered, Problem> {
-        let factors = Factors { ambient: self.ambient as f32, diffuse: self.diffuse as f32, scatter: self.scatter as f32 };
+        let factors =
+            Factors { ambient: self.ambient as f32, diffuse: self.diffuse as f32, scatter: self.scatter as f32 };
         let mut flags = Vec::new();
         let mut binds = vec![
             ("camera", surface.camera()),
@@ -314,9 +321,5 @@ impl Technique for SphericalThickness {
             array: false,
             binds,
         }))
-    }
-
-    fn refuses(&self, _: &Material) -> Option<Problem> {
-        None
     }
 }
