@@ -159,7 +159,7 @@ fn pictures() {
         let scene = studio.scene(side);
         let truth = studio.picture(&scene, TRUTH, true);
         let mut row = vec![truth.clone()];
-        let mut measure = |studio: &mut Studio, technique: &str, skip: bool, name: &str| {
+        let measure = |studio: &mut Studio, technique: &str, skip: bool, name: &str| {
             let picture = studio.picture(&scene, technique, skip);
             let shown = alike(&picture, &truth);
             let told = |image: &Image| {

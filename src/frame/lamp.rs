@@ -107,8 +107,10 @@ impl<'a> Surface<'a> {
     /// Views of a member alone, grown by `margin` scene units on all sides.
     pub fn lamp_views(&self, member: &Member, lamp: &Lamp, margin: f64) -> LampViews {
         let item = self.item(member);
-        let (middle, _) = item.ball();
-        let corners = item.corners.map(|p| p + 2.0 * margin * (p - middle).normalize_or_zero());
+        // Around each corner an octahedron that holds a ball of the margin.
+        let reach = 3f64.sqrt() * margin;
+        let around = |p: DVec3| [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| [p - reach * axis, p + reach * axis]);
+        let corners: Vec<DVec3> = item.corners.iter().flat_map(|p| around(*p)).flatten().collect();
         let views = LightViews::of(lamp.light, &corners);
         let matrix = |clip_from_world: DMat4| (clip_from_world * DMat4::from(item.world_from_object)).as_mat4();
         LampViews {

@@ -190,6 +190,23 @@ mod tests {
     }
 
     #[test]
+    fn numbers_that_mean_nothing_are_told_at_their_place() {
+        for (ron, path) in [
+            ("SphericalThickness(bands: 9)", "bands"),
+            ("SphericalThickness(front_bands: 0)", "front_bands"),
+            ("SphericalThickness(max_thickness: 0)", "max_thickness"),
+            ("SphericalThickness(window: -1)", "window"),
+            ("DepthMapThickness(blur: -1)", "blur"),
+            ("DepthMapThickness(max_thickness: -3)", "max_thickness"),
+        ] {
+            let text = TechniqueText::from_flag("--technique", ron).unwrap();
+            let problem = read(&text).err().unwrap_or_else(|| panic!("{ron} is read"));
+            assert_eq!(problem.path.as_deref(), Some(path), "{ron}: {problem}");
+            assert!(problem.at.is_some_and(|at| at.column > ron.find(path).unwrap()) && problem.hint.is_some());
+        }
+    }
+
+    #[test]
     fn a_name_that_is_not_there_brings_the_nearest_one() {
         let text = TechniqueText::from_flag("--technique", "FilterdNormals()").unwrap();
         assert!(read(&text).err().unwrap().hint.unwrap().contains("FilteredNormals"));
