@@ -34,7 +34,7 @@ fn main() {
 /// Rays that leave a figure's vertices inwards, on one thread.
 fn rays() {
     const DIRECTIONS: usize = 256;
-    let mesh = sculpture::sculpture(sculpture::Figure::Hare, 5.0, 5);
+    let mesh = sculpture::sculpture(sculpture::Figure::Hare, 5.0, 190);
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread can be had");
     let count = mesh.positions.len() * DIRECTIONS / 2;
     println!("{} vertices, {} triangles, {count} rays inwards", mesh.positions.len(), mesh.triangles.len());
