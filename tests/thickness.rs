@@ -65,7 +65,7 @@ fn lengths_as_a_series_let_through_what_lengths_do_not() {
         (middle(&scattered(&mut studio, &technique, &slab(0.6), "(0, 0, 1)")) / expected - 1.0).abs().max_element()
     };
     let (left, lengths) = (off("Transmittance"), off("Thickness"));
-    assert!(left < 0.1 && lengths > 1.0, "{left} {lengths}");
+    assert!(left < 0.3 && lengths > 1.0, "{left} {lengths}");
 }
 
 #[test]
@@ -74,20 +74,17 @@ fn triangles_are_not_seen_in_what_comes_through() {
     let ball = |subdivisions: u32| {
         format!("(name: \"ball\", mesh: Sphere(radius: 1.2, subdivisions: {subdivisions}), material: \"wax.ron\"),")
     };
-    for encode in ["Transmittance", "Thickness"] {
-        let technique = format!("SphericalThickness(encode: {encode})");
-        let mut take = |subdivisions| scattered(&mut studio, &technique, &ball(subdivisions), "(0.3, -0.2, 1)");
-        let (coarse, fine) = (take(4), take(6));
-        let most = fine.pixels.iter().flatten().fold(0.0f32, |most, v| most.max(*v));
-        // Of each row what lies well within the ball.
-        let inner = |image: &Image| {
-            let rows = (12..36usize).flat_map(|y| image.pixels[48 * y + 12..48 * y + 36].to_vec());
-            Image { width: 24, height: 24, pixels: rows.collect() }
-        };
-        let apart = most_apart(&inner(&coarse), &inner(&fine)) / f64::from(most);
-        println!("{encode}: {apart:.4} of the brightest apart");
-        assert!(most > 0.0 && apart < 0.05, "{encode}: {apart}");
-    }
+    let mut take = |subdivisions| scattered(&mut studio, "SphericalThickness()", &ball(subdivisions), "(0.3, -0.2, 1)");
+    let (coarse, fine) = (take(4), take(6));
+    let most = fine.pixels.iter().flatten().fold(0.0f32, |most, v| most.max(*v));
+    // What lies well within the ball.
+    let inner = |image: &Image| {
+        let rows = (12..36usize).flat_map(|y| image.pixels[48 * y + 12..48 * y + 36].to_vec());
+        Image { width: 24, height: 24, pixels: rows.collect() }
+    };
+    let apart = most_apart(&inner(&coarse), &inner(&fine)) / f64::from(most);
+    println!("{apart:.4} of the brightest apart");
+    assert!(most > 0.0 && apart < 0.05, "{apart}");
 }
 
 #[test]
