@@ -96,6 +96,13 @@ uniform! {
     }
 }
 
+/// Where a lamp's light enters an object, and what is left of it after so many mm.
+struct Entry {
+    /// Views of one sample of the lamp.
+    per_sample: u32,
+    binds: Vec<(&'static str, Bind)>,
+}
+
 impl DepthMapThickness {
     pub fn read(text: &TechniqueText) -> Result<Box<dyn Technique>, Problem> {
         let settings: DepthMapThickness = text.settings()?;
@@ -119,7 +126,7 @@ impl DepthMapThickness {
         })
     }
 
-    /// What a pass for one lamp binds: where its light enters the object, and what is left of it after so many mm.
+    /// What a pass for one lamp needs to know of it.
     fn entry(
         &self,
         plan: &mut Plan,
@@ -127,7 +134,7 @@ impl DepthMapThickness {
         member: &Member,
         lamp: &Lamp,
         normals: Slot<Buffer>,
-    ) -> Result<(u32, Vec<(&'static str, Bind)>), Problem> {
+    ) -> Result<Entry, Problem> {
         let (mm_per_unit, extent) = (surface.mm_per_unit(), surface.extent(member));
         let grow = self.grow * extent;
         let (middle, diagonal) = surface.box_of(member);
@@ -169,7 +176,7 @@ impl DepthMapThickness {
             ("distances", Bind::Texture(map, 0)),
         ];
         binds.extend(response.map(|response| ("transmittances", response.table(diagonal * mm_per_unit))));
-        Ok((views.per_sample, binds))
+        Ok(Entry { per_sample: views.per_sample, binds })
     }
 
     /// The light of one object: a pass for each lamp, each on top of the one before.
@@ -189,9 +196,9 @@ impl DepthMapThickness {
             if let Some(lamp) = lamp {
                 flags.push("LAMP");
                 about = format!("`{}`", lamp.name);
-                let (views, entry) = self.entry(plan, surface, member, &lamp, normals)?;
-                per_sample = views;
-                binds.extend(entry);
+                let entry = self.entry(plan, surface, member, &lamp, normals)?;
+                per_sample = entry.per_sample;
+                binds.extend(entry.binds);
                 if self.terms == Terms::Balanced {
                     flags.push("BALANCED");
                 }
