@@ -36,6 +36,10 @@ pub const PAPERS: &[Paper] = &[
     ),
     paper("Dupuy2023", "J. Dupuy & A. Benyoub. Sampling Visible GGX Normals with Spherical Caps. CGF 42(8), 2023"),
     paper(
+        "Felzenszwalb2012",
+        "P. Felzenszwalb & D. Huttenlocher. Distance Transforms of Sampled Functions. Theory of Computing 8(19), 2012",
+    ),
+    paper(
         "Francois2006",
         "G. François, S. Pattanaik, K. Bouatouch & G. Breton. Subsurface Texture Mapping. IRISA PI 1806, 2006",
     ),

@@ -4,6 +4,7 @@
 //! them: threads share the work by items, and every sum runs in a fixed order.
 
 pub mod bvh;
+pub mod clearance;
 pub mod deform;
 pub mod mesh;
 pub mod nearest;
