@@ -4,8 +4,8 @@
 //! function, boundaries reflect and refract by Fresnel or by GGX microfacets; nothing is approximated. One path serves three
 //! channels: its free paths are drawn for one of them, and its weight is the balance heuristic over all three (spectral
 //! multiple importance sampling [Wilkie2014]), so that no channel's weight exceeds 3. Lamps are joined to each vertex that
-//! can see them; those without extent also through a refracting boundary ([`super::refracted`], [`super::lobe`]), where few
-//! paths or none would find them.
+//! can see them, and through refracting boundaries too ([`super::refracted`], [`super::lobe`]), where few paths or none
+//! would find them.
 //!
 //! Radiance is counted per squared index of the medium that it travels in. Lengths are scene units.
 
