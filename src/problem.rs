@@ -3,6 +3,7 @@
 //! A [`Problem`] is one thing that is wrong; [`Problems`] is what a reader hands back, since errors of meaning are
 //! reported all at once. Warnings are problems too, of [`Severity::Warning`]: the picture will come, and disappoint.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -169,9 +170,9 @@ impl fmt::Display for Problem {
         }
         write!(f, "{}: ", if self.is_error() { "error" } else { "warning" })?;
         if let Some(path) = &self.path {
-            write!(f, "{path}: ")?;
+            write!(f, "{}: ", clipped(path))?;
         }
-        write!(f, "{}", self.what)?;
+        write!(f, "{}", clipped(&self.what))?;
         if let Some(at) = self.at.as_ref().filter(|at| at.line > 0) {
             let number = at.line.to_string();
             let margin = " ".repeat(number.len());
@@ -180,16 +181,25 @@ impl fmt::Display for Problem {
             let lead: String = shown.chars().take(column - 1).map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
             write!(f, "\n{margin} |\n{number} | {shown}\n{margin} | {lead}{}", "^".repeat(width))?;
             if let Some(hint) = &self.hint {
-                write!(f, "\n{margin} = hint: {hint}")?;
+                write!(f, "\n{margin} = hint: {}", clipped(hint))?;
             }
         } else if let Some(hint) = &self.hint {
-            write!(f, "\n  hint: {hint}")?;
+            write!(f, "\n  hint: {}", clipped(hint))?;
         }
         Ok(())
     }
 }
 
 impl std::error::Error for Problem {}
+
+/// As much of a text as anybody reads: a file may hold a name of any length.
+fn clipped(text: &str) -> Cow<'_, str> {
+    const READ: usize = 1500;
+    match text.char_indices().nth(READ) {
+        Some((end, _)) => format!("{}…", &text[..end]).into(),
+        None => text.into(),
+    }
+}
 
 /// All that is wrong with what was read, in the order of the files; never empty when it is an `Err`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -228,9 +238,15 @@ pub fn counted(number: usize, thing: &str) -> String {
 
 /// The word in `known` that `word` was probably meant to be.
 pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    // To compare two words takes time and memory in proportion to both, and a file may name anything.
+    const LONGEST: usize = 256;
+    if word.len() > LONGEST {
+        return None;
+    }
     let lower = word.to_lowercase();
     known
         .into_iter()
+        .filter(|k| k.len() <= LONGEST)
         .map(|k| (strsim::damerau_levenshtein(&lower, &k.to_lowercase()), k))
         .filter(|(distance, k)| *distance <= 1 + k.len().min(word.len()) / 3 && *distance < k.len().max(word.len()))
         .min_by_key(|(distance, _)| *distance)
@@ -254,6 +270,15 @@ mod tests {
         let marks = lines[3].iter().position(|c| *c == '^').unwrap();
         assert_eq!(lines[2][marks..marks + 4], ['O', 'O', 'P', 'S']);
         assert!(lines[2][4] == '…' && lines[2].ends_with(&['…']));
+    }
+
+    #[test]
+    fn names_of_any_length_are_told_and_compared_at_once() {
+        let name = "n".repeat(10_000_000);
+        let problem = Problem::files(format!("there is no `{name}`")).path(&name).hint(format!("not {name}"));
+        assert!(problem.to_string().len() < 5000 && problem.to_string().contains("there is no `nnn"));
+        assert_eq!(nearest(&name, ["n", &name]), None);
+        assert_eq!(nearest("nn", ["n", &name]), Some("n"));
     }
 
     #[test]

@@ -29,6 +29,8 @@ pub fn read_obj(bytes: &[u8], path: &Path) -> Result<(Mesh, Vec<Problem>), Probl
     if bytes.contains(&0) {
         return Err(whole(path, "this is binary data, not OBJ text").hint("export the mesh as Wavefront OBJ"));
     }
+    // Some editors begin a text with a mark of its encoding, which would hide the first vertex and shift all others.
+    let bytes = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes);
     let mut checked = Checked::default();
     // Faces may name what comes after them.
     for (_, line) in lines(bytes) {

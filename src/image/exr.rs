@@ -12,12 +12,19 @@ use ::exr::prelude::{
 use super::read::{MAX_BYTES, Refused, refuse_size};
 use super::{Image, Texture};
 
+/// What a byte of a file unpacks to at most: DEFLATE makes 1032 bytes of one, and PXR24 four of three.
+const MAX_BYTES_PER_BYTE: u64 = 1376;
+
 /// Reads R, G, B and A of the file's first layer, or Y in place of R, G and B.
 pub(super) fn decode(bytes: &[u8]) -> Result<Texture, Refused> {
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(refused)?;
     for header in &meta.headers {
         let Vec2(width, height) = header.layer_size;
-        refuse_size(width as u64, height as u64)?;
+        refuse_size(width as u64, height as u64, bytes.len())?;
+        let all = (width * height).saturating_mul(header.channels.bytes_per_pixel) as u64;
+        if all > MAX_BYTES_PER_BYTE * bytes.len() as u64 {
+            return Err(Refused::damaged(&format!("{} bytes cannot hold {all} bytes of pixels", bytes.len())));
+        }
         // Blocks are unpacked whole, with all channels of the layer, wanted or not.
         let block = match header.blocks {
             BlockDescription::ScanLines => width * header.compression.scan_lines_per_block().min(height),

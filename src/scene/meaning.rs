@@ -6,25 +6,26 @@ use crate::scene::path::join;
 use crate::scene::tree::{Node, Value};
 use std::collections::BTreeSet;
 
-/// Nobody reads more, and each costs a look at the whole text.
+/// Nobody reads more errors, nor more warnings, and each costs a look at the whole text.
 const MOST: usize = 100;
 
 /// What is wrong with what the files mean: found all at once, each thing at its place.
 pub struct Judge<'a> {
     pub root: &'a Node,
     pub problems: Vec<Problem>,
+    errors: usize,
 }
 
 impl<'a> Judge<'a> {
     /// Numbers that are none are found at once, wherever they are.
     pub fn new(root: &'a Node) -> Judge<'a> {
-        let mut judge = Judge { root, problems: Vec::new() };
+        let mut judge = Judge { root, problems: Vec::new(), errors: 0 };
         root.walk("", &mut |path, node| {
             if let Value::Number(n) = node.value
                 && !n.is_finite()
                 && !judge.full()
             {
-                judge.problems.push(
+                judge.add(
                     Problem::files(format!("{} is not a finite number", node.text()))
                         .at(node.at())
                         .path(path)
@@ -34,9 +35,20 @@ impl<'a> Judge<'a> {
         });
         judge
     }
-    /// Whether there are so many problems that looking for more would help nobody.
+    /// Whether there are so many errors that looking for more would help nobody.
     pub fn full(&self) -> bool {
-        self.problems.len() >= MOST
+        self.errors >= MOST
+    }
+    fn warnings(&self) -> usize {
+        self.problems.len() - self.errors
+    }
+    /// What is one too many is left out. Warnings leave room for every error: where there is one, there is no scene.
+    pub fn add(&mut self, problem: Problem) {
+        let alike = if problem.is_error() { self.errors } else { self.warnings() };
+        if alike < MOST {
+            self.errors += usize::from(problem.is_error());
+            self.problems.push(problem);
+        }
     }
     pub fn node(&self, path: &str) -> &'a Node {
         self.root.nearest(path)
@@ -47,14 +59,18 @@ impl<'a> Judge<'a> {
         if text.chars().count() > 40 || text.contains('\n') { "this".to_string() } else { text.to_string() }
     }
     pub fn wrong(&mut self, path: &str, what: impl Into<String>, hint: impl Into<String>) {
-        self.problems.push(Problem::files(what).at(self.node(path).at()).path(path).hint(hint));
+        if !self.full() {
+            self.add(Problem::files(what).at(self.node(path).at()).path(path).hint(hint));
+        }
     }
     pub fn warn(&mut self, path: &str, what: impl Into<String>, hint: impl Into<String>) {
-        self.problems.push(Problem::warning(what).at(self.node(path).at()).path(path).hint(hint));
+        if self.warnings() < MOST {
+            self.add(Problem::warning(what).at(self.node(path).at()).path(path).hint(hint));
+        }
     }
     /// What was found elsewhere, on behalf of the value at `path`.
     pub fn found(&mut self, path: &str, problem: Problem) {
-        self.problems.push(Problem { path: Some(path.to_string()), ..problem });
+        self.add(Problem { path: Some(path.to_string()), ..problem });
     }
 
     /// That each of `values` is `allowed`; what is not finite was said already.
@@ -68,7 +84,7 @@ impl<'a> Judge<'a> {
             };
             let node = self.node(&place);
             let what = format!("{} is not allowed", self.written(&place));
-            self.problems.push(Problem::files(what).at(node.at()).path(path).hint(range));
+            self.add(Problem::files(what).at(node.at()).path(path).hint(range));
         }
     }
     /// That a name is not empty and not among `seen`.
@@ -84,7 +100,7 @@ impl<'a> Judge<'a> {
         if !known.contains(&word) {
             let problem = Problem::files(format!("there is no {what} `{word}`"));
             let at = self.node(&format!("{path}.0")).at();
-            self.problems.push(problem.at(at).path(path).hint(suggest(word, known.iter().copied())));
+            self.add(problem.at(at).path(path).hint(suggest(word, known.iter().copied())));
         }
     }
 }

@@ -174,11 +174,11 @@ impl Reader {
         }
         let material = match self.material_of(&file) {
             Ok((material, problems)) => {
-                judge.problems.extend(problems);
+                problems.into_iter().for_each(|problem| judge.add(problem));
                 material.map(Arc::new)
             }
             Err(problem) => {
-                judge.problems.push(match has_line(&problem) {
+                judge.add(match has_line(&problem) {
                     true => problem,
                     false => at_its_name(problem, judge.node(path)).path(path),
                 });

@@ -250,9 +250,21 @@ fn a_file_with_a_hundred_thousand_mistakes_is_told_the_first() {
         [many("(name: \"\"),"), many("(transform: (scale: NaN)),"), many("(name: \"a\", material: \"no.ron\"),")]
     {
         let Problems(problems) = scene(&text).unwrap_err();
-        assert!(problems.len() > 50 && problems.len() < 200);
+        assert!(problems.len() > 50 && problems.len() <= 200);
     }
+    let skies = format!("Scene(version: 1, mm_per_unit: 1, lights: [{}])", "Environment(),".repeat(100_000));
+    assert_eq!(scene(&skies).unwrap_err().0.len(), 100);
     assert_eq!(scene(&many("(name: \"a\", visible: 3),")).unwrap_err().0.len(), 1);
+}
+
+/// Every bare object is worth two warnings.
+#[test]
+fn warnings_neither_hide_an_error_nor_are_one() {
+    let bare = |more: &str| format!("Scene(version: 1, mm_per_unit: 1, objects: [{}{more}])", "(),".repeat(300));
+    let (scene_read, warnings) = scene(&bare("")).unwrap();
+    assert_eq!((scene_read.objects.len(), warnings.len()), (300, 100));
+    let Problems(problems) = scene(&bare("(transform: (scale: 0))")).unwrap_err();
+    assert!(problems.iter().any(|p| p.is_error() && p.path.as_deref() == Some("objects[300].transform.scale")));
 }
 
 /// Files of which every part is well spelled.

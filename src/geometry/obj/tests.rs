@@ -185,6 +185,12 @@ fn what_cannot_be_repaired_is_refused_at_its_line() {
 }
 
 #[test]
+fn a_mark_of_the_encoding_hides_no_vertex() {
+    let text = format!("{SQUARE}f 1 2 3 4\n");
+    assert_eq!(clean(&format!("\u{feff}{text}")), clean(&text));
+}
+
+#[test]
 fn long_lines_are_read_in_linear_time_and_not_printed() {
     let told = refused(&format!("v 0 0 0\nf {}x\n", "1 ".repeat(100_000)));
     assert!(told.starts_with("m.obj:2:200003:") && told.len() < 400_000, "{}", told.len());
