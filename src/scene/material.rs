@@ -202,7 +202,7 @@ pub fn build(file: &MaterialFile, reader: &Reader, judge: &mut Judge<'_>) -> Opt
 /// A mean free path so short that its coefficients are no numbers any more.
 fn dense_enough(path: &str, substance: Substance, judge: &mut Judge<'_>) -> Option<Substance> {
     match &substance {
-        Substance::Translucent(m) if !(m.sigma_t().is_finite() && m.g.is_finite()) => {
+        Substance::Translucent(m) if !(m.sigma_t() + m.sigma_tr() + m.g).is_finite() => {
             judge.wrong(path, "this medium is too dense to compute with", "a longer mean free path: it is in mm");
             None
         }

@@ -70,7 +70,8 @@ fn words(name: &str, root: &Path, seeds: &[Vec<u8>]) -> BTreeSet<Vec<u8>> {
             b"\xe2\x80\xa8", b"b.ron", b"c.ron", b"d.ron", b"a.ron", b"a.obj", b"a.png", b"fuzz.ron", b"../", b"true",
             b"false", b"scene,technique,settings,size,measure,unit,repeat,value\n", b",ms,1,0.5\n", b"\"\"",
         ],
-        _ => &[],
+        // Lengths, as they are written.
+        _ => &[b"diaphane", b"\x80\x80", b"\xff\xff\xff\xff\x0f", b"\xff\xff\xff\xff\xff\xff\xff\xff\xff\x01", b"\0\0\xc0\x7f"],
     };
     let mut words: BTreeSet<Vec<u8>> = fixed.iter().map(|word| word.to_vec()).collect();
     if matches!(name, "scene" | "material" | "bench") {
