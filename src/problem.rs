@@ -182,7 +182,8 @@ impl fmt::Display for Problem {
             let number = at.line.to_string();
             let margin = " ".repeat(number.len());
             // A tab stays a tab, so that the marks stand under their value.
-            let lead: String = at.source.chars().take(at.mark.saturating_sub(1)).map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
+            let lead: String =
+                at.source.chars().take(at.mark.saturating_sub(1)).map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
             write!(f, "\n{margin} |\n{number} | {}\n{margin} | {lead}{}", at.source, "^".repeat(at.width))?;
             if let Some(hint) = &self.hint {
                 write!(f, "\n{margin} = hint: {}", clipped(hint))?;

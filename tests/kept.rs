@@ -54,7 +54,10 @@ fn checks_have_teeth() {
     let cache = checks::target("cache").expect("it is one");
     cache(&bake);
     cache(&bake[..bake.len() - 1]);
-    let scene = format!("Scene(version: 1, mm_per_unit: 1.0, objects: [(mesh: File(\"a.obj\"), material: \"a.ron\")]){}view.size=(0, 1)", checks::PART);
+    let scene = format!(
+        "Scene(version: 1, mm_per_unit: 1.0, objects: [(mesh: File(\"a.obj\"), material: \"a.ron\")]){}view.size=(0, 1)",
+        checks::PART
+    );
     checks::target("scene").expect("it is one")(scene.as_bytes());
     assert!(checks::target("tea").is_none());
 }

@@ -50,38 +50,151 @@ fn escaped(word: &[u8]) -> String {
 fn words(name: &str, root: &Path, seeds: &[Vec<u8>]) -> BTreeSet<Vec<u8>> {
     let fixed: &[&[u8]] = match name {
         "image" => &[
-            b"IHDR", b"IDAT", b"IEND", b"PLTE", b"tRNS", b"iCCP", b"gAMA", b"sRGB", b"tEXt", b"zTXt", b"iTXt", b"acTL",
-            b"fcTL", b"fdAT", b"#?RADIANCE\n", b"#?RGBE\n", b"FORMAT=32-bit_rle_rgbe\n", b"FORMAT=32-bit_rle_xyze\n",
-            b"-Y 2 +X 2\n", b"+X 2 -Y 2\n", b"EXPOSURE=", b"\xff\xc0", b"\xff\xc2", b"\xff\xc4", b"\xff\xda", b"\xff\xdb",
-            b"\xff\xdd", b"\xff\xd9", b"\xff\xee", b"Adobe", b"channels\0chlist\0", b"compression\0compression\0",
-            b"dataWindow\0box2i\0", b"displayWindow\0box2i\0", b"lineOrder\0lineOrder\0", b"tiles\0tiledesc\0",
-            b"comments\0string\0", b"chunkCount\0int\0", b"type\0string\0", b"name\0string\0", b"view\0string\0",
-            b"scanlineimage", b"tiledimage", b"deepscanline", b"preview\0preview\0",
+            b"IHDR",
+            b"IDAT",
+            b"IEND",
+            b"PLTE",
+            b"tRNS",
+            b"iCCP",
+            b"gAMA",
+            b"sRGB",
+            b"tEXt",
+            b"zTXt",
+            b"iTXt",
+            b"acTL",
+            b"fcTL",
+            b"fdAT",
+            b"#?RADIANCE\n",
+            b"#?RGBE\n",
+            b"FORMAT=32-bit_rle_rgbe\n",
+            b"FORMAT=32-bit_rle_xyze\n",
+            b"-Y 2 +X 2\n",
+            b"+X 2 -Y 2\n",
+            b"EXPOSURE=",
+            b"\xff\xc0",
+            b"\xff\xc2",
+            b"\xff\xc4",
+            b"\xff\xda",
+            b"\xff\xdb",
+            b"\xff\xdd",
+            b"\xff\xd9",
+            b"\xff\xee",
+            b"Adobe",
+            b"channels\0chlist\0",
+            b"compression\0compression\0",
+            b"dataWindow\0box2i\0",
+            b"displayWindow\0box2i\0",
+            b"lineOrder\0lineOrder\0",
+            b"tiles\0tiledesc\0",
+            b"comments\0string\0",
+            b"chunkCount\0int\0",
+            b"type\0string\0",
+            b"name\0string\0",
+            b"view\0string\0",
+            b"scanlineimage",
+            b"tiledimage",
+            b"deepscanline",
+            b"preview\0preview\0",
         ],
         "obj" => &[
-            b"v ", b"vt ", b"vn ", b"f ", b"fo ", b"g ", b"o ", b"s ", b"l ", b"p ", b"usemtl ", b"mtllib ", b"vp ", b"#",
-            b"\\\n", b"\r\n", b"//", b"nan", b"inf", b"-inf", b"1e38", b"1e-45", b"3.4028235e38", b"-1", b"4294967296",
-            b"9223372036854775807", b"-9223372036854775808", b"1/1/1", b"\xff", b"\xe2\x80\xa8", b"\x0b", b"\xc2\xa0",
+            b"v ",
+            b"vt ",
+            b"vn ",
+            b"f ",
+            b"fo ",
+            b"g ",
+            b"o ",
+            b"s ",
+            b"l ",
+            b"p ",
+            b"usemtl ",
+            b"mtllib ",
+            b"vp ",
+            b"#",
+            b"\\\n",
+            b"\r\n",
+            b"//",
+            b"nan",
+            b"inf",
+            b"-inf",
+            b"1e38",
+            b"1e-45",
+            b"3.4028235e38",
+            b"-1",
+            b"4294967296",
+            b"9223372036854775807",
+            b"-9223372036854775808",
+            b"1/1/1",
+            b"\xff",
+            b"\xe2\x80\xa8",
+            b"\x0b",
+            b"\xc2\xa0",
         ],
         "scene" | "material" | "bench" => &[
-            b"NaN", b"inf", b"-inf", b"1e308", b"1e-308", b"5e-324", b"0x", b"0b1", b"1_0", b"2u8", b"9007199254740993",
-            b"18446744073709551615", b"340282366920938463463374607431768211455", b"/*", b"*/", b"//", b"#![enable(",
-            b"r#\"", b"\"#", b"\\u{", b"\\x41", b"Some(", b"None", b"()", b"(,)", b"\xef\xbb\xbf", b"\r\n", b"\xc2\x85",
-            b"\xe2\x80\xa8", b"b.ron", b"c.ron", b"d.ron", b"a.ron", b"a.obj", b"a.png", b"fuzz.ron", b"../", b"true",
-            b"false", b"scene,technique,settings,size,measure,unit,repeat,value\n", b",ms,1,0.5\n", b"\"\"",
+            b"NaN",
+            b"inf",
+            b"-inf",
+            b"1e308",
+            b"1e-308",
+            b"5e-324",
+            b"0x",
+            b"0b1",
+            b"1_0",
+            b"2u8",
+            b"9007199254740993",
+            b"18446744073709551615",
+            b"340282366920938463463374607431768211455",
+            b"/*",
+            b"*/",
+            b"//",
+            b"#![enable(",
+            b"r#\"",
+            b"\"#",
+            b"\\u{",
+            b"\\x41",
+            b"Some(",
+            b"None",
+            b"()",
+            b"(,)",
+            b"\xef\xbb\xbf",
+            b"\r\n",
+            b"\xc2\x85",
+            b"\xe2\x80\xa8",
+            b"b.ron",
+            b"c.ron",
+            b"d.ron",
+            b"a.ron",
+            b"a.obj",
+            b"a.png",
+            b"fuzz.ron",
+            b"../",
+            b"true",
+            b"false",
+            b"scene,technique,settings,size,measure,unit,repeat,value\n",
+            b",ms,1,0.5\n",
+            b"\"\"",
         ],
         // Lengths, as they are written.
-        _ => &[b"diaphane", b"\x80\x80", b"\xff\xff\xff\xff\x0f", b"\xff\xff\xff\xff\xff\xff\xff\xff\xff\x01", b"\0\0\xc0\x7f"],
+        _ => &[
+            b"diaphane",
+            b"\x80\x80",
+            b"\xff\xff\xff\xff\x0f",
+            b"\xff\xff\xff\xff\xff\xff\xff\xff\xff\x01",
+            b"\0\0\xc0\x7f",
+        ],
     };
     let mut words: BTreeSet<Vec<u8>> = fixed.iter().map(|word| word.to_vec()).collect();
     if matches!(name, "scene" | "material" | "bench") {
         words.insert(PART.as_bytes().to_vec());
         // Every word of the files, and of what the program says of mistakes in them: all that is known here or there.
-        let told = listed(&root.join("tests/problems")).into_iter().filter(|path| path.extension().is_some_and(|e| e == "txt"));
+        let told = listed(&root.join("tests/problems"))
+            .into_iter()
+            .filter(|path| path.extension().is_some_and(|e| e == "txt"));
         let told: Vec<Vec<u8>> = told.filter_map(|path| std::fs::read(path).ok()).collect();
         for text in seeds.iter().chain(&told) {
             let letter = |byte: &u8| byte.is_ascii_alphanumeric() || *byte == b'_';
-            let names = text.split(|byte| !letter(byte)).filter(|word| word.first().is_some_and(u8::is_ascii_alphabetic));
+            let names =
+                text.split(|byte| !letter(byte)).filter(|word| word.first().is_some_and(u8::is_ascii_alphabetic));
             words.extend(names.filter(|word| (2..=30).contains(&word.len())).map(<[u8]>::to_vec));
         }
     }
@@ -161,7 +274,10 @@ fn meshes(root: &Path) -> Vec<Vec<u8>> {
     let sphere = diaphane::geometry::shapes::sphere(1.0, 0);
     let mut text = String::new();
     sphere.positions.iter().for_each(|p| text += &format!("v {} {} {}\n", p.x, p.y, p.z));
-    sphere.triangles.iter().for_each(|[a, b, c]| text += &format!("f {0}//{0} {1}//{1} {2}//{2}\n", a + 1, b + 1, c + 1));
+    sphere
+        .triangles
+        .iter()
+        .for_each(|[a, b, c]| text += &format!("f {0}//{0} {1}//{1} {2}//{2}\n", a + 1, b + 1, c + 1));
     sphere.normals.iter().for_each(|n| text += &format!("vn {} {} {}\n", n.x, n.y, n.z));
     meshes.push(text.into_bytes());
     meshes.extend(std::fs::read(root.join("tests/problems/parts/triangle.obj")));
@@ -171,9 +287,16 @@ fn meshes(root: &Path) -> Vec<Vec<u8>> {
 fn bakes() -> Vec<Vec<u8>> {
     let nothing = [0; 4];
     let some = [
-        &[1, 3][..], &[0; 36], &[3], &[0; 36], &[0, 1, 0, 1, 2],
-        &[1, 1, 1, 0, 1, 4, 1], &[0; 97],
-        &[1, 1, b'a'], &0.5_f64.to_le_bytes(), &[2, 7, 8],
+        &[1, 3][..],
+        &[0; 36],
+        &[3],
+        &[0; 36],
+        &[0, 1, 0, 1, 2],
+        &[1, 1, 1, 0, 1, 4, 1],
+        &[0; 97],
+        &[1, 1, b'a'],
+        &0.5_f64.to_le_bytes(),
+        &[2, 7, 8],
     ]
     .concat();
     let file = |content: &[u8]| sign(&[&[0; 67][..], content].concat());
@@ -190,8 +313,12 @@ fn images() -> Vec<Vec<u8>> {
     let mut images = vec![encoded(Format::Png), encoded(Format::Exr)];
     let levels: Vec<u8> = (0..SIDE * SIDE * 8).map(|i| (i / 7) as u8).collect();
     for (color, bytes) in [
-        (ExtendedColorType::L8, 1), (ExtendedColorType::La8, 2), (ExtendedColorType::Rgb8, 3), (ExtendedColorType::Rgba8, 4),
-        (ExtendedColorType::L16, 2), (ExtendedColorType::Rgba16, 8),
+        (ExtendedColorType::L8, 1),
+        (ExtendedColorType::La8, 2),
+        (ExtendedColorType::Rgb8, 3),
+        (ExtendedColorType::Rgba8, 4),
+        (ExtendedColorType::L16, 2),
+        (ExtendedColorType::Rgba16, 8),
     ] {
         let mut out = Vec::new();
         let data = &levels[..(8 * 8 * bytes) as usize];
@@ -211,9 +338,14 @@ fn images() -> Vec<Vec<u8>> {
     images.push(out);
     let tiles = Blocks::Tiles(Vec2(16, 16));
     for (compression, blocks) in [
-        (Compression::Uncompressed, Blocks::ScanLines), (Compression::RLE, tiles), (Compression::ZIP1, Blocks::ScanLines),
-        (Compression::ZIP16, tiles), (Compression::PIZ, Blocks::ScanLines), (Compression::PXR24, tiles),
-        (Compression::B44, Blocks::ScanLines), (Compression::B44A, tiles),
+        (Compression::Uncompressed, Blocks::ScanLines),
+        (Compression::RLE, tiles),
+        (Compression::ZIP1, Blocks::ScanLines),
+        (Compression::ZIP16, tiles),
+        (Compression::PIZ, Blocks::ScanLines),
+        (Compression::PXR24, tiles),
+        (Compression::B44, Blocks::ScanLines),
+        (Compression::B44A, tiles),
     ] {
         let channels = SpecificChannels::rgba(|Vec2(x, y)| {
             let [r, g, b] = picture.at(x as u32, y as u32);

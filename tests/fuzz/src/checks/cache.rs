@@ -51,9 +51,20 @@ fn plan() -> (Plan, Slot<Value>) {
 
 /// The file that holds `content`, as the header of a bake is described: magic, format, lengths, checksum.
 fn whole(key: &Key, content: &[u8]) -> Vec<u8> {
-    let sum = blake3::Hasher::new().update(key.as_bytes()).update(NAME.as_bytes()).update(content).finalize();
-    let (name, length) = ((NAME.len() as u32).to_le_bytes(), (content.len() as u64).to_le_bytes());
-    [b"diaphane", &1_u32.to_le_bytes()[..], &name, &length, sum.as_bytes(), NAME.as_bytes(), content].concat()
+    let (name, length) = (NAME.len() as u64, (content.len() as u64).to_le_bytes());
+    let mut sum = blake3::Hasher::new();
+    sum.update(key.as_bytes()).update(&name.to_le_bytes()).update(NAME.as_bytes()).update(content);
+    let header = [b"diaphane", &2_u32.to_le_bytes()[..], &name.to_le_bytes()[..4], &length].concat();
+    [&header, &sum.finalize().as_bytes()[..], NAME.as_bytes(), content].concat()
+}
+
+/// A whole file whose header puts the end of the name somewhere else, `by` bytes further on than it says.
+fn shifted(mut file: Vec<u8>, by: i8) -> Vec<u8> {
+    let name = (NAME.len() as u32).wrapping_add_signed(by.into());
+    let length = (file.len() as u64).wrapping_sub(56 + u64::from(name));
+    file[12..16].copy_from_slice(&name.to_le_bytes());
+    file[16..24].copy_from_slice(&length.to_le_bytes());
+    file
 }
 
 /// What is damaged in the header of a file mended, so that its content is looked at.
@@ -84,6 +95,13 @@ fn ask(folder: &Path) -> (Value, Origin, Vec<Problem>) {
 }
 
 pub fn check(bytes: &[u8]) {
+    alone(bytes);
+    if let Some(by) = bytes.last().filter(|by| **by != 0) {
+        alone(&shifted(sign(bytes), *by as i8));
+    }
+}
+
+fn alone(bytes: &[u8]) {
     let folder = folder();
     let key = plan().1.key();
     let name = key.to_string();
