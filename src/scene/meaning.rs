@@ -9,6 +9,13 @@ use std::collections::BTreeSet;
 /// Nobody reads more errors, nor more warnings, and each costs a look at the whole text.
 const MOST: usize = 100;
 
+/// Pictures are drawn with 32-bit numbers, which end at 3e38.
+const LARGEST: f64 = 1e30;
+
+fn is_computable(number: f64) -> bool {
+    number.abs() <= LARGEST
+}
+
 /// What is wrong with what the files mean: found all at once, each thing at its place.
 pub struct Judge<'a> {
     pub root: &'a Node,
@@ -17,20 +24,19 @@ pub struct Judge<'a> {
 }
 
 impl<'a> Judge<'a> {
-    /// Numbers that are none are found at once, wherever they are.
+    /// Numbers that are none, or too large, are found at once, wherever they are.
     pub fn new(root: &'a Node) -> Judge<'a> {
         let mut judge = Judge { root, problems: Vec::new(), errors: 0 };
         root.walk("", &mut |path, node| {
             if let Value::Number(n) = node.value
-                && !n.is_finite()
+                && !is_computable(n)
                 && !judge.full()
             {
-                judge.add(
-                    Problem::files(format!("{} is not a finite number", node.text()))
-                        .at(node.at())
-                        .path(path)
-                        .hint("write a number"),
-                );
+                let (what, hint) = match n.is_finite() {
+                    true => ("is too large to compute with", format!("at most {LARGEST:e}")),
+                    false => ("is not a finite number", "write a number".to_string()),
+                };
+                judge.add(Problem::files(format!("{} {what}", node.text())).at(node.at()).path(path).hint(hint));
             }
         });
         judge
@@ -73,9 +79,9 @@ impl<'a> Judge<'a> {
         self.add(Problem { path: Some(path.to_string()), ..problem });
     }
 
-    /// That each of `values` is `allowed`; what is not finite was said already.
+    /// That each of `values` is `allowed`; what cannot be computed with was said already.
     pub fn all(&mut self, path: &str, values: &[f64], allowed: impl Fn(f64) -> bool, range: &str) {
-        if !self.full() && values.iter().all(|v| v.is_finite()) && !values.iter().all(|v| allowed(*v)) {
+        if !self.full() && values.iter().all(|v| is_computable(*v)) && !values.iter().all(|v| allowed(*v)) {
             // One number of several is marked by itself where it is written by itself.
             let member = values.iter().position(|v| !allowed(*v)).map(|i| format!("{path}.{i}"));
             let place = match member.filter(|m| values.len() > 1 && self.root.get(m).is_some()) {
