@@ -257,6 +257,26 @@ fn a_file_with_a_hundred_thousand_mistakes_is_told_the_first() {
     assert_eq!(scene(&many("(name: \"a\", visible: 3),")).unwrap_err().0.len(), 1);
 }
 
+#[test]
+#[cfg(unix)]
+fn a_circle_of_bases_is_seen_through_links_and_what_only_looks_like_one_is_not() {
+    let dir = tempfile::tempdir().unwrap();
+    let [one, two] = ["one", "two"].map(|name| dir.path().join(name));
+    [&one, &two].into_iter().for_each(|folder| std::fs::create_dir(folder).unwrap());
+    std::os::unix::fs::symlink(".", one.join("here")).unwrap();
+    std::os::unix::fs::symlink(&two, one.join("there")).unwrap();
+    let write = |path: PathBuf, base: &str| {
+        std::fs::write(&path, format!("Material(version: 1, base: \"{base}\")")).unwrap();
+        path
+    };
+    let Problems(problems) = reader().material(&write(one.join("a.ron"), "here/a.ron")).unwrap_err();
+    assert!(problems[0].what.contains("inherit from itself"), "{problems:?}");
+    // `there/..` is the folder of both, not `one`.
+    let first = write(one.join("b.ron"), "there/../b.ron");
+    std::fs::write(dir.path().join("b.ron"), "Material(version: 1, surface: (ior: 1.7))").unwrap();
+    assert_eq!(reader().material(&first).unwrap().0.surface.ior, 1.7);
+}
+
 /// Every bare object is worth two warnings.
 #[test]
 fn warnings_neither_hide_an_error_nor_are_one() {
