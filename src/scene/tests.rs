@@ -258,6 +258,16 @@ fn a_file_with_a_hundred_thousand_mistakes_is_told_the_first() {
 }
 
 #[test]
+fn a_material_has_a_few_layers() {
+    let of = |layers: usize| {
+        let layer = |i| format!("(depth: {i}, medium: Color()),");
+        format!("Material(version: 1, layers: [{}])", (0..layers).map(layer).collect::<String>())
+    };
+    assert_eq!(material(&of(64)).unwrap().0.layers.len(), 64);
+    assert!(show(&material(&of(65)).unwrap_err().0).contains("at most 64"));
+}
+
+#[test]
 #[cfg(unix)]
 fn a_circle_of_bases_is_seen_through_links_and_what_only_looks_like_one_is_not() {
     let dir = tempfile::tempdir().unwrap();
@@ -280,11 +290,12 @@ fn a_circle_of_bases_is_seen_through_links_and_what_only_looks_like_one_is_not()
 /// Every bare object is worth two warnings.
 #[test]
 fn warnings_neither_hide_an_error_nor_are_one() {
-    let bare = |more: &str| format!("Scene(version: 1, mm_per_unit: 1, objects: [{}{more}])", "(),".repeat(300));
+    let bare = |more: &str| format!("Scene(version: 1, mm_per_unit: 1, objects: [{}{more}])", "(),".repeat(20_000));
     let (scene_read, warnings) = scene(&bare("")).unwrap();
-    assert_eq!((scene_read.objects.len(), warnings.len()), (300, 100));
+    assert_eq!((scene_read.objects.len(), warnings.len()), (20_000, 100));
+    assert!(Arc::ptr_eq(&scene_read.objects[0].material, &scene_read.objects[1].material));
     let Problems(problems) = scene(&bare("(transform: (scale: 0))")).unwrap_err();
-    assert!(problems.iter().any(|p| p.is_error() && p.path.as_deref() == Some("objects[300].transform.scale")));
+    assert!(problems.iter().any(|p| p.is_error() && p.path.as_deref() == Some("objects[20000].transform.scale")));
 }
 
 /// Files of which every part is well spelled.
