@@ -62,3 +62,33 @@ fn parts(bytes: &[u8]) -> Vec<&[u8]> {
 fn folder() -> tempfile::TempDir {
     tempfile::tempdir().expect("a folder can be made")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use diaphane::problem::{At, Problem};
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+    use std::path::Path;
+
+    fn fails(work: impl FnOnce()) -> bool {
+        catch_unwind(AssertUnwindSafe(work)).is_err()
+    }
+
+    #[test]
+    fn laws_fail_when_they_are_broken() {
+        let (path, text) = (Path::new("a.ron"), b"one\r\ntwo".as_slice());
+        let place = |line, column| At { column, ..At::in_line(path, line, "two", 0..3) };
+        let sound = |at: At| problems::sound(&Problem::files("no").at(at), &[(path, text)]);
+        sound(place(2, 1));
+        assert!(fails(|| sound(place(3, 1))) && fails(|| sound(place(2, 5))) && fails(|| sound(place(1, 1))));
+        assert!(fails(|| problems::sound(&Problem::files(""), &[])));
+        assert!(fails(|| problems::all_sound(&diaphane::problem::Problems(vec![Problem::warning("no")]), &[])));
+
+        shelf::finite(&("inf \" NaN", 1.0));
+        assert!(fails(|| shelf::finite(&f64::INFINITY)) && fails(|| shelf::finite(&(1, f64::NAN))));
+
+        let (_, most) = memory::most(|| vec![0_u8; 50 << 20].len());
+        assert!(most >= 50 << 20);
+        assert!(fails(|| panics::caught(|| assert!(fails(|| panic!("our own"))))));
+    }
+}
