@@ -5,6 +5,8 @@
 
 pub mod bvh;
 pub mod deform;
+mod intrinsic;
+pub mod laplacian;
 pub mod mesh;
 pub mod nearest;
 pub mod neighbours;
@@ -13,4 +15,5 @@ pub mod obj;
 mod polygon;
 pub mod sculpture;
 pub mod shapes;
+pub mod spectrum;
 pub mod visibility;
