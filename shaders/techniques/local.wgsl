@@ -1,7 +1,8 @@
 // Light that leaves where it entered: a surface that scatters the irradiance which its normal gathers.
 //
 // The normal may be any that a technique hands over. Radiance out = (1 - F_out) scatter E, with E the irradiance that
-// got in, and scatter = albedo / (c pi) such that all of `albedo` leaves.
+// got in, and scatter = albedo / (c pi) such that all of `albedo` leaves. With CHANNELS every colour channel has a normal of
+// its own, and what the surroundings send to it.
 
 #include "frame/scene.wgsl"
 #include "frame/surface.wgsl"
@@ -21,10 +22,14 @@
 struct Vertex {
     @invariant @builtin(position) clip: vec4f,
     @location(0) position: vec3f,
-    @location(1) normal: vec3f,
-    @location(2) @interpolate(flat) object: u32,
+    @location(1) @interpolate(flat) object: u32,
 #if ENVIRONMENT
-    @location(3) environment: vec3f,
+    @location(2) environment: vec3f,
+#endif
+    @location(3) normal: vec3f,
+#if CHANNELS
+    @location(4) normal_g: vec3f,
+    @location(5) normal_b: vec3f,
 #endif
 }
 
@@ -33,8 +38,18 @@ fn vertex(
     @builtin(instance_index) index: u32,
     @location(0) position: vec3f,
     @location(1) normal: vec3f,
+#if CHANNELS
+    @location(2) normal_g: vec3f,
+    @location(3) normal_b: vec3f,
+#if ENVIRONMENT
+    @location(4) environment_r: vec4f,
+    @location(5) environment_g: vec4f,
+    @location(6) environment_b: vec4f,
+#endif
+#else
 #if ENVIRONMENT
     @location(2) environment: vec4f,
+#endif
 #endif
 ) -> Vertex {
     var out: Vertex;
@@ -42,10 +57,26 @@ fn vertex(
     out.clip = project(camera, out.position);
     out.normal = turned(objects[index], normal);
     out.object = index;
+#if CHANNELS
+    out.normal_g = turned(objects[index], normal_g);
+    out.normal_b = turned(objects[index], normal_b);
+#if ENVIRONMENT
+    out.environment = vec3f(environment_r.r, environment_g.g, environment_b.b);
+#endif
+#else
 #if ENVIRONMENT
     out.environment = environment.rgb;
 #endif
+#endif
     return out;
+}
+
+// The share of a light's irradiance that enters: what faces it, less what is reflected.
+fn taken(normal: vec3f, direction: vec3f, eta: f32) -> f32 {
+    // A filtered normal may be shorter than 1: it dims, and points where it points.
+    let inverse_length = 1.0 / max(length(normal), 1e-20);
+    let cos_length = max(0.0, dot(normal, direction));
+    return cos_length * (1.0 - fresnel_dielectric(min(1.0, cos_length * inverse_length), eta));
 }
 
 @fragment
@@ -58,15 +89,19 @@ fn fragment(in: Vertex) -> @location(0) vec4f {
     entered += in.environment;
 #endif
 #if LIGHTS
-    let inverse_length = 1.0 / max(length(in.normal), 1e-20);
     for (var l = 0u; l < arrayLength(&lights); l++) {
         let light = lights[l];
         var from_light = vec3f(0.0);
         for (var i = 0; i < light_samples(light); i++) {
             let light_in = incident(light, i, in.position);
-            let cos_length = max(0.0, dot(in.normal, light_in.direction));
-            let enters = 1.0 - fresnel_dielectric(min(1.0, cos_length * inverse_length), object.eta);
-            from_light += cos_length * enters * light_in.irradiance;
+#if CHANNELS
+            let r = taken(in.normal, light_in.direction, object.eta);
+            let g = taken(in.normal_g, light_in.direction, object.eta);
+            let b = taken(in.normal_b, light_in.direction, object.eta);
+            from_light += vec3f(r, g, b) * light_in.irradiance;
+#else
+            from_light += taken(in.normal, light_in.direction, object.eta) * light_in.irradiance;
+#endif
         }
 #if SHADOWS
         if light.visibility >= 0 {

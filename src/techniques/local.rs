@@ -7,11 +7,19 @@ use crate::store::{Plan, Slot};
 
 use super::Scattered;
 
-/// Scatters the irradiance that each member's `normals` gather. Whatever the normals are, the steps are the same.
+/// The normals that gather a member's light.
+pub(super) enum Normals {
+    Same(Slot<Buffer>),
+    /// One per colour channel: red, green, blue.
+    Each([Slot<Buffer>; 3]),
+}
+
+/// Scatters the irradiance that each member's `normals` gather. Whatever the normals are, the steps are the same, but that
+/// normals per channel gather the surroundings' light three times.
 pub(super) fn scatter(
     plan: &mut Plan,
     surface: &Surface,
-    mut normals: impl FnMut(&mut Plan, &Member) -> Result<Slot<Buffer>, Problem>,
+    mut normals: impl FnMut(&mut Plan, &Member) -> Result<Normals, Problem>,
 ) -> Result<Scattered, Problem> {
     let mut flags = Vec::new();
     let mut binds: Vec<(&'static str, Bind)> =
@@ -24,16 +32,31 @@ pub(super) fn scatter(
         flags.push("SHADOWS");
         binds.push(("visibility", visibility));
     }
-    let mut draws = Vec::new();
-    let mut environment = false;
+    let mut gathered = Vec::new();
     for member in surface.members() {
         let normals = normals(plan, &member)?;
-        let mut streams = vec![normals];
-        if let Some(sky) = surface.environment(plan, &member, normals)? {
-            environment = true;
-            streams.push(sky);
+        gathered.push((member, normals));
+    }
+    // A pass has one shader: where one member has three normals, all have.
+    let channels = gathered.iter().any(|(_, normals)| matches!(normals, Normals::Each(_)));
+    if channels {
+        flags.push("CHANNELS");
+    }
+    let mut draws = Vec::new();
+    let mut environment = false;
+    for (member, normals) in &gathered {
+        let mut streams = match normals {
+            Normals::Each(each) => each.to_vec(),
+            Normals::Same(same) if channels => vec![*same; 3],
+            Normals::Same(same) => vec![*same],
+        };
+        for normals in streams.clone() {
+            if let Some(sky) = surface.environment(plan, member, normals)? {
+                environment = true;
+                streams.push(sky);
+            }
         }
-        draws.push(surface.draw(plan, &member, streams));
+        draws.push(surface.draw(plan, member, streams));
     }
     if environment {
         flags.push("ENVIRONMENT");

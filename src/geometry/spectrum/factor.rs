@@ -27,8 +27,7 @@ fn too_large(_: impl std::fmt::Debug) -> Problem {
 
 fn view(matrix: &CsMat<f64>) -> SparseColMatRef<'_, usize, f64> {
     let starts = matrix.indptr().into_raw_storage();
-    let symbolic =
-        SymbolicSparseColMatRef::new_checked(matrix.rows(), matrix.cols(), starts, None, matrix.indices());
+    let symbolic = SymbolicSparseColMatRef::new_checked(matrix.rows(), matrix.cols(), starts, None, matrix.indices());
     SparseColMatRef::new(symbolic, matrix.data())
 }
 

@@ -244,3 +244,81 @@ impl Slicer<'_> {
         Ok(Some((lambda, columns)))
     }
 }
+
+/// Every pair of a small mesh, for tests of what does without.
+#[cfg(test)]
+pub(super) fn all(laplacian: &Laplacian, field: &[DVec3]) -> Result<Modes, Problem> {
+    let (lambda, columns, _) = whole(laplacian, f64::INFINITY)?;
+    let coefficients = Modes::project(&columns, &laplacian.areas, field);
+    Ok(Modes { lambda, columns, coefficients })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::shapes;
+
+    fn worst_apart(a: &[DVec3], b: &[DVec3]) -> f64 {
+        a.iter().zip(b).map(|(a, b)| a.distance(*b)).fold(0.0, |m, d| if d <= m { m } else { d })
+    }
+
+    /// Both have repeated eigenvalues: whatever basis of their spaces is found, the field is the same.
+    #[test]
+    fn bands_find_what_dense_algebra_finds_and_no_pair_twice() {
+        let cube = shapes::slab(DVec3::splat(1.0), (10, 10));
+        for (name, mesh) in [("sphere", shapes::sphere(1.0, 3)), ("cube", cube)] {
+            let laplacian = Laplacian::of(&mesh);
+            let field: Vec<DVec3> =
+                (0..laplacian.samples()).map(|i| DVec3::new(1.0, 0.3, -0.2) * (1.7 * i as f64).sin()).collect();
+            // Three bands or so.
+            let area: f64 = laplacian.areas.iter().sum();
+            let end = 200.0 * 4.0 * std::f64::consts::PI / area;
+            let found = bands(&laplacian, end, &|_| Ok(())).unwrap();
+            let (lambda, columns, reached) = whole(&laplacian, found.2).unwrap();
+            assert!(found.2 >= end && reached >= end);
+            assert!(lambda.len() > 150, "{name}: {}", lambda.len());
+            assert_eq!(found.0.len(), lambda.len(), "{name}");
+            for (a, b) in found.0.iter().zip(&lambda) {
+                assert!((a - b).abs() < 1e-6 * end, "{name}: {a} {b}");
+            }
+            let modes = |(lambda, columns): (Vec<f64>, Vec<f64>)| {
+                let coefficients = Modes::project(&columns, &laplacian.areas, &field);
+                Modes { lambda, columns, coefficients }
+            };
+            let [a, b] = [(found.0, found.1), (lambda, columns)].map(modes);
+            let [at, bt] = [&a, &b].map(|modes| modes.sum(laplacian.samples(), |_| 1.0));
+            assert!(worst_apart(&at, &bt) < 1e-5, "{name}: {}", worst_apart(&at, &bt));
+            // Orthonormal by area.
+            for k in [0, 1, 40, 81, 120] {
+                for j in 0..a.lambda.len() {
+                    let pairs = a.column(k).iter().zip(a.column(j)).zip(&laplacian.areas);
+                    let product: f64 = pairs.map(|((x, y), area)| area * x * y).sum();
+                    assert!((product - (k == j) as u32 as f64).abs() < 1e-6, "{name}: {k} {j} {product}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_sphere_has_its_frequencies_as_often_as_it_should() {
+        let mesh = shapes::sphere(1.0, 3);
+        let laplacian = Laplacian::of(&mesh);
+        let field = vec![DVec3::ONE; laplacian.samples()];
+        // l (l + 1) with 2 l + 1 modes each; between those of 3 and of 4.
+        let cut = (16.0f64).sqrt() * laplacian.edge;
+        let (modes, reached) = modes(&laplacian, &field, cut, &|_| Ok(())).unwrap();
+        let expected: Vec<f64> = (1..4).flat_map(|l| vec![(l * (l + 1)) as f64; 2 * l + 1]).collect();
+        assert_eq!(modes.lambda.len(), expected.len());
+        assert!(reached >= cut);
+        for (found, expected) in modes.lambda.iter().zip(&expected) {
+            let found = found / (laplacian.edge * laplacian.edge);
+            assert!((found / expected - 1.0).abs() < 0.02, "{found} {expected}");
+        }
+        // A constant has nothing of any.
+        assert!(modes.coefficients.iter().all(|c| c.length() < 1e-9));
+        // A cut within the five of l = 2 takes them all, or none: they are not repeated here, but nearly.
+        let within = modes.lambda[5].sqrt();
+        let (cut, _) = super::modes(&laplacian, &field, within, &|_| Ok(())).unwrap();
+        assert!(cut.lambda.last().unwrap() * (1.0 + REPEATED) < modes.lambda[cut.lambda.len()]);
+    }
+}

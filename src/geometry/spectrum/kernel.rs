@@ -61,6 +61,31 @@ impl Kernel {
         })
     }
 
+    /// The same per mean edge, for a share of omega_m.
+    pub fn knee_per_edge(&self) -> f64 {
+        match self {
+            Kernel::Normalized { std } => std * super::OMEGA_M,
+            _ => super::OMEGA_M,
+        }
+    }
+
+    /// Where it has ended: frequencies beyond have less than a thousandth of the first one's weight. None: nowhere, or
+    /// where the mesh says.
+    pub fn end(&self) -> Option<f64> {
+        const LITTLE: f64 = 1e-3;
+        match self {
+            Kernel::Box { wavelength } => Some(std::f64::consts::TAU / wavelength),
+            Kernel::Curve { points } => {
+                let (last, weight) = *points.last()?;
+                (weight == 0.0).then_some(last)
+            }
+            kernel => {
+                let knee = kernel.knee()?;
+                (0..5).map(|i| knee * 2f64.powi(i)).find(|omega| kernel.at(*omega, 1.0) < LITTLE)
+            }
+        }
+    }
+
     /// Whether every frequency keeps its whole weight.
     pub fn is_identity(&self) -> bool {
         match self {

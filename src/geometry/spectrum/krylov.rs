@@ -138,9 +138,8 @@ impl Projected<'_> {
     /// Adds what a solve makes of the last block. False when that is nothing new: the space is whole.
     fn grow(&mut self, factor: &Factor) -> bool {
         let (first, root) = (self.size(), &self.space.root);
-        let mut block = Mat::from_fn(root.len(), first - self.last, |i, c| {
-            self.space.column(self.last + c)[i] * root[i]
-        });
+        let mut block =
+            Mat::from_fn(root.len(), first - self.last, |i, c| self.space.column(self.last + c)[i] * root[i]);
         for c in 0..block.ncols() {
             factor.solve(block.col_as_slice_mut(c));
             block.col_as_slice_mut(c).iter_mut().zip(root).for_each(|(v, root)| *v *= root);

@@ -97,14 +97,7 @@ pub struct Weights {
 
 impl Basis {
     /// Of a field per vertex, whose modes are known and whose values at the samples are `at_samples`.
-    fn new(
-        laplacian: &Laplacian,
-        field: &[Vec3],
-        at_samples: &[DVec3],
-        modes: &Modes,
-        cut: f64,
-        error: f64,
-    ) -> Basis {
+    fn new(laplacian: &Laplacian, field: &[Vec3], at_samples: &[DVec3], modes: &Modes, cut: f64, error: f64) -> Basis {
         let samples = laplacian.samples();
         let means = laplacian.means(at_samples);
         let sums = modes.sum(samples, |_| 1.0);
@@ -113,9 +106,8 @@ impl Basis {
             NOWHERE => Vec3::ZERO,
             s => (value.as_dvec3() - means[s as usize] - sums[s as usize]).as_vec3(),
         };
-        let largest: Vec<f64> = (0..modes.lambda.len())
-            .map(|k| modes.column(k).iter().fold(0.0f64, |most, y| most.max(y.abs())))
-            .collect();
+        let largest: Vec<f64> =
+            (0..modes.lambda.len()).map(|k| modes.column(k).iter().fold(0.0f64, |most, y| most.max(y.abs()))).collect();
         let columns = (0..modes.lambda.len())
             .flat_map(|k| modes.column(k).iter().map(|y| (y / largest[k]) as f32).collect::<Vec<_>>())
             .collect();
@@ -149,8 +141,7 @@ impl Basis {
     /// The filtered field, per vertex.
     pub fn filter(&self, kernel: &Kernel, mm_per_unit: f64) -> Vec<Vec3> {
         let weights = self.weights(kernel, mm_per_unit);
-        let modes: Vec<Vec3> =
-            weights.modes.iter().zip(&self.coefficients).map(|(w, c)| (*w * *c).as_vec3()).collect();
+        let modes: Vec<Vec3> = weights.modes.iter().zip(&self.coefficients).map(|(w, c)| (*w * *c).as_vec3()).collect();
         const CHUNK: usize = 1024;
         let chunk = |first: usize| {
             let mut sums = vec![Vec3::ZERO; CHUNK.min(self.samples - first)];
@@ -160,7 +151,8 @@ impl Basis {
             }
             sums
         };
-        let sums: Vec<Vec<Vec3>> = (0..self.samples.div_ceil(CHUNK)).into_par_iter().map(|c| chunk(c * CHUNK)).collect();
+        let sums: Vec<Vec<Vec3>> =
+            (0..self.samples.div_ceil(CHUNK)).into_par_iter().map(|c| chunk(c * CHUNK)).collect();
         let sum = |s: u32| if s == NOWHERE { Vec3::ZERO } else { sums[s as usize / CHUNK][s as usize % CHUNK] };
         let (low, high) = (weights.low as f32, weights.high as f32);
         (0..self.sample.len()).map(|v| low * self.low[v] + sum(self.sample[v]) + high * self.high[v]).collect()
@@ -173,11 +165,32 @@ const FINEST: f64 = PI;
 /// omega_m, rad per mean edge: ten edges are one wavelength [Patro2007, section 3.2].
 const OMEGA_M: f64 = TAU / 10.0;
 
-/// The normals of a mesh by a Krylov space that is good for smooth kernels whose knees lie in `band`, rad per unit.
-pub fn krylov_normals(mesh: &Mesh, band: (f64, f64), tick: Tick) -> Result<Basis, Problem> {
+/// Frequencies between which kernels have their knees.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub enum Band {
+    /// rad per unit of the mesh
+    PerUnit(f64, f64),
+    /// rad per mean edge
+    PerEdge(f64, f64),
+}
+
+impl std::fmt::Display for Band {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Band::PerUnit(low, high) => write!(f, "{low:.3} to {high:.3} rad a unit"),
+            Band::PerEdge(low, high) => write!(f, "{low:.3} to {high:.3} rad an edge"),
+        }
+    }
+}
+
+/// The normals of a mesh by a Krylov space that is good for smooth kernels with knees in a band.
+pub fn krylov_normals(mesh: &Mesh, band: Band, tick: Tick) -> Result<Basis, Problem> {
     let laplacian = Laplacian::of(mesh);
     let field = laplacian.at_samples(mesh.normals.iter().map(|n| n.as_dvec3()));
-    let band = (band.0 * laplacian.edge, band.1 * laplacian.edge);
+    let band = match band {
+        Band::PerUnit(low, high) => (low * laplacian.edge, high * laplacian.edge),
+        Band::PerEdge(low, high) => (low, high),
+    };
     let (modes, error) = krylov::modes(&laplacian, &field, band, tick)?;
     Ok(Basis::new(&laplacian, &mesh.normals, &field, &modes, FINEST, error))
 }

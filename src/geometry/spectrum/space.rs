@@ -51,8 +51,7 @@ impl<'a> Space<'a> {
 
     /// Adds the new directions of a block. A column is compared with its own length, or with a given one.
     pub fn extend(&mut self, mut block: Mat<f64>, measure: Option<f64>) -> Vec<Split> {
-        let lengths: Vec<f64> =
-            (0..block.ncols()).map(|c| measure.unwrap_or(length(block.col_as_slice(c)))).collect();
+        let lengths: Vec<f64> = (0..block.ncols()).map(|c| measure.unwrap_or(length(block.col_as_slice(c)))).collect();
         let before = self.size;
         let mut inside = Mat::<f64>::zeros(before, block.ncols());
         // Twice is enough.
