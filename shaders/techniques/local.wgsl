@@ -5,6 +5,7 @@
 
 #include "frame/scene.wgsl"
 #include "frame/surface.wgsl"
+#include "frame/entering.wgsl"
 #include "frame/lights.wgsl"
 #include "optics/fresnel.wgsl"
 
@@ -58,16 +59,9 @@ fn fragment(in: Vertex) -> @location(0) vec4f {
     entered += in.environment;
 #endif
 #if LIGHTS
-    let inverse_length = 1.0 / max(length(in.normal), 1e-20);
     for (var l = 0u; l < arrayLength(&lights); l++) {
         let light = lights[l];
-        var from_light = vec3f(0.0);
-        for (var i = 0; i < light_samples(light); i++) {
-            let light_in = incident(light, i, in.position);
-            let cos_length = max(0.0, dot(in.normal, light_in.direction));
-            let enters = 1.0 - fresnel_dielectric(min(1.0, cos_length * inverse_length), object.eta);
-            from_light += cos_length * enters * light_in.irradiance;
-        }
+        var from_light = entering(light, in.position, in.normal, object.eta);
 #if SHADOWS
         if light.visibility >= 0 {
             from_light *= textureLoad(visibility, pixel, light.visibility, 0).r;
