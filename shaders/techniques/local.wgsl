@@ -6,6 +6,7 @@
 
 #include "frame/scene.wgsl"
 #include "frame/surface.wgsl"
+#include "frame/entering.wgsl"
 #include "frame/lights.wgsl"
 #include "optics/fresnel.wgsl"
 
@@ -71,14 +72,6 @@ fn vertex(
     return out;
 }
 
-// The share of a light's irradiance that enters: what faces it, less what is reflected.
-fn taken(normal: vec3f, direction: vec3f, eta: f32) -> f32 {
-    // A filtered normal may be shorter than 1: it dims, and points where it points.
-    let inverse_length = 1.0 / max(length(normal), 1e-20);
-    let cos_length = max(0.0, dot(normal, direction));
-    return cos_length * (1.0 - fresnel_dielectric(min(1.0, cos_length * inverse_length), eta));
-}
-
 @fragment
 fn fragment(in: Vertex) -> @location(0) vec4f {
     let object = objects[in.object];
@@ -91,18 +84,15 @@ fn fragment(in: Vertex) -> @location(0) vec4f {
 #if LIGHTS
     for (var l = 0u; l < arrayLength(&lights); l++) {
         let light = lights[l];
-        var from_light = vec3f(0.0);
-        for (var i = 0; i < light_samples(light); i++) {
-            let light_in = incident(light, i, in.position);
 #if CHANNELS
-            let r = taken(in.normal, light_in.direction, object.eta);
-            let g = taken(in.normal_g, light_in.direction, object.eta);
-            let b = taken(in.normal_b, light_in.direction, object.eta);
-            from_light += vec3f(r, g, b) * light_in.irradiance;
+        var from_light = vec3f(
+            entering(light, in.position, in.normal, object.eta).r,
+            entering(light, in.position, in.normal_g, object.eta).g,
+            entering(light, in.position, in.normal_b, object.eta).b,
+        );
 #else
-            from_light += taken(in.normal, light_in.direction, object.eta) * light_in.irradiance;
+        var from_light = entering(light, in.position, in.normal, object.eta);
 #endif
-        }
 #if SHADOWS
         if light.visibility >= 0 {
             from_light *= textureLoad(visibility, pixel, light.visibility, 0).r;
