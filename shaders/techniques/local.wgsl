@@ -79,7 +79,7 @@ fn fragment(in: Vertex) -> @location(0) vec4f {
     let normal_out = unpack_direction(textureLoad(packed_map, pixel, 0).x);
     var entered = vec3f(0.0);
 #if ENVIRONMENT
-    entered += in.environment;
+    entered += max(vec3f(0.0), in.environment);
 #endif
 #if LIGHTS
     for (var l = 0u; l < arrayLength(&lights); l++) {

@@ -1,7 +1,7 @@
 //! Light that leaves where it entered, for a normal that may be any: one raster pass on the G-buffer's surfaces.
 
 use crate::frame::{Member, Surface};
-use crate::gpu::{Bind, Blend, Buffer, Format, Layer, Raster};
+use crate::gpu::{Bind, Blend, Buffer, Draw, Format, Layer, Raster};
 use crate::problem::{Problem, counted};
 use crate::store::{Plan, Slot};
 
@@ -61,10 +61,36 @@ pub(super) fn scatter(
     if environment {
         flags.push("ENVIRONMENT");
     }
+    pass(plan, surface, &flags, binds, draws)
+}
+
+/// Scatters irradiance that is known at each member's vertices (`vec4f`), shadows and all. Where a filter of it rang below
+/// nothing there is none.
+pub(super) fn scatter_known(
+    plan: &mut Plan,
+    surface: &Surface,
+    mut irradiance: impl FnMut(&mut Plan, &Member) -> Result<Slot<Buffer>, Problem>,
+) -> Result<Scattered, Problem> {
+    let binds = vec![("camera", surface.camera()), ("objects", surface.objects()), ("packed_map", surface.packed())];
+    let mut draws = Vec::new();
+    for member in surface.members() {
+        let streams = vec![surface.normals(plan, &member), irradiance(plan, &member)?];
+        draws.push(surface.draw(plan, &member, streams));
+    }
+    pass(plan, surface, &["ENVIRONMENT"], binds, draws)
+}
+
+fn pass(
+    plan: &mut Plan,
+    surface: &Surface,
+    flags: &[&str],
+    binds: Vec<(&'static str, Bind)>,
+    draws: Vec<Draw>,
+) -> Result<Scattered, Problem> {
     Ok(plan.add(Raster {
         name: "technique.local",
         about: format!("light that {} scattered where it entered", counted(draws.len(), "thing")),
-        shader: surface.shader("techniques/local.wgsl", &flags)?,
+        shader: surface.shader("techniques/local.wgsl", flags)?,
         size: surface.size(),
         targets: vec![(Format::Rgba32Float, Blend::Replace)],
         depth: surface.depth(),

@@ -68,7 +68,7 @@ impl Factor<'_> {
         factor.solve_in_place_with_conj(Conj::No, right, Par::Seq, MemStack::new(&mut memory));
     }
 
-    /// How many eigenvalues of the matrix are negative [Sylvester's law of inertia].
+    /// How many eigenvalues of the matrix are negative, by Sylvester's law of inertia.
     pub fn negative(&self) -> usize {
         match self.pattern.0.raw() {
             SymbolicCholeskyRaw::Simplicial(symbolic) => {

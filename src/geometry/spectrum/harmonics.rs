@@ -84,17 +84,17 @@ fn bands(laplacian: &Laplacian, end: f64, tick: Tick) -> Result<Pairs, Problem> 
             let (to, negative) = slicer.end_of_band(aim)?;
             let count = negative.checked_sub(below).ok_or_else(|| breakdown("eigenvalues were counted twice"))?;
             // A crowd of eigenvalues, as many small components have it, or a run that did not converge: half of the band.
-            let is_crowd = count > 2 * BAND as usize && to - from > 1e-6 * to;
-            let found = match is_crowd {
+            let is_narrow = aim - from < 1e-3 * width;
+            let found = match count > 2 * BAND as usize && !is_narrow {
                 true => None,
                 false => {
                     let known = &columns[columns.len() - previous * laplacian.samples()..];
-                    slicer.band((from, to), count, known, tick, from / end, to / end)?
+                    slicer.band((from, to), count, known, &|share| tick((from + share * (to - from)) / end))?
                 }
             };
             match found {
                 Some(found) => break (to, count, found),
-                None if aim - from < 1e-3 * width => return Err(breakdown("eigenpairs of a band did not converge")),
+                None if is_narrow => return Err(breakdown("eigenpairs of a band did not converge")),
                 None => aim = from + 0.5 * (aim - from),
             }
         };
@@ -147,8 +147,6 @@ impl Slicer<'_> {
         count: usize,
         known: &[f64],
         tick: Tick,
-        begun: f64,
-        done: f64,
     ) -> Result<Option<(Vec<f64>, Vec<f64>)>, Problem> {
         if count == 0 {
             return Ok(Some((Vec::new(), Vec::new())));
@@ -157,7 +155,7 @@ impl Slicer<'_> {
         let shift = 0.5 * (from + to);
         let factor = self.factor(shift)?;
         let known_count = known.len() / n;
-        let most = (4 * count + 12 * BLOCK).min(n - self.laplacian.components());
+        let most = (3 * count + 12 * BLOCK).min(n - self.laplacian.components());
         let mut space = Space::new(self.laplacian, known_count + most);
         let scaled = Mat::from_fn(n, known_count, |i, k| known[k * n + i] * self.laplacian.areas[i].sqrt());
         space.extend(scaled, Some(1.0));
@@ -186,7 +184,7 @@ impl Slicer<'_> {
             let is_whole = space.size == range.end;
             let size = range.end - first;
             if size * 2 >= 3 * count || is_whole || space.is_full() {
-                tick(begun + (done - begun) * (size as f64 / most as f64).min(1.0))?;
+                tick((size as f64 / most as f64).min(1.0))?;
                 let (inverse, vectors) = eigen(projected.as_ref().submatrix(first, first, size, size))?;
                 // A Ritz vector's residual is what its last block leaves behind.
                 let left = |k: usize| {
@@ -200,7 +198,7 @@ impl Slicer<'_> {
                 let inside: Vec<usize> = (0..size)
                     .filter(|&k| inverse[k] != 0.0 && (from..to).contains(&(shift + 1.0 / inverse[k])))
                     .collect();
-                let converged = inside.iter().all(|&k| left(k) < 1e-10 * inverse[k].abs());
+                let converged = inside.iter().all(|&k| left(k) < 1e-9 * inverse[k].abs());
                 if inside.len() == count && (converged || is_whole) {
                     let basis = space.columns().subcols(first, size);
                     return self.accept(basis, &vectors, &inside, &inverse, shift, to, &space);

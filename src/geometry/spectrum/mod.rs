@@ -159,6 +159,72 @@ impl Basis {
     }
 }
 
+/// Modes of a mesh for any field at its samples, those of frequency 0 among them, one for each component.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Harmonics {
+    /// The frequency of each mode, rad per unit of the mesh.
+    pub omega: Vec<f64>,
+    /// One value per sample, mode after mode; the largest of each mode is 1 or -1.
+    pub columns: Vec<f32>,
+    /// The square of what each mode's values are to be multiplied by to be orthonormal.
+    pub squares: Vec<f64>,
+    /// Of each sample, unit².
+    pub areas: Vec<f32>,
+    /// The sample of each vertex, or [`NOWHERE`].
+    pub sample: Vec<u32>,
+    /// Where the modes end, and the finest frequency of the mesh; rad per unit.
+    pub cut: f64,
+    pub finest: f64,
+}
+
+impl Harmonics {
+    /// The weight of each mode, and that of all which they miss.
+    pub fn weights(&self, kernel: &Kernel, mm_per_unit: f64) -> (Vec<f64>, f64) {
+        let [cut, finest] = [self.cut, self.finest].map(|omega| omega / mm_per_unit);
+        let omega_m = 0.2 * finest;
+        let modes = self.omega.iter().map(|omega| kernel.at(omega / mm_per_unit, omega_m)).collect();
+        (modes, kernel.mean(cut, finest, omega_m))
+    }
+
+    pub fn samples(&self) -> usize {
+        self.areas.len()
+    }
+}
+
+/// The eigenpairs of a mesh up to `highest` (rad per unit), or to its finest frequency if that is lower. Light has edges
+/// that normals do not have: what a kernel does beyond omega_m is not for a mean to say.
+pub fn all_harmonics(mesh: &Mesh, highest: f64, tick: Tick) -> Result<Harmonics, Problem> {
+    let laplacian = Laplacian::of(mesh);
+    let samples = laplacian.samples();
+    let cut = FINEST.min(highest * laplacian.edge);
+    let nothing = vec![DVec3::ZERO; samples];
+    let (modes, reached) = harmonics::modes(&laplacian, &nothing, cut, tick)?;
+    let per_unit = |per_edge: f64| per_edge / laplacian.edge;
+    let area = laplacian.edge * laplacian.edge;
+    let parts = laplacian.components();
+    let mut squares = vec![0.0; parts];
+    let mut columns = vec![0.0f32; parts * samples];
+    for (s, &c) in laplacian.component.iter().enumerate() {
+        squares[c as usize] += area * laplacian.areas[s];
+        columns[c as usize * samples + s] = 1.0;
+    }
+    squares.iter_mut().for_each(|square| *square = 1.0 / *square);
+    for k in 0..modes.lambda.len() {
+        let largest = modes.column(k).iter().fold(0.0f64, |most, y| most.max(y.abs()));
+        columns.extend(modes.column(k).iter().map(|y| (y / largest) as f32));
+        squares.push(largest * largest / area);
+    }
+    Ok(Harmonics {
+        omega: vec![0.0; parts].into_iter().chain(modes.lambda.iter().map(|l| per_unit(l.sqrt()))).collect(),
+        columns,
+        squares,
+        areas: laplacian.areas.iter().map(|a| (area * a) as f32).collect(),
+        sample: laplacian.sample,
+        cut: per_unit(reached),
+        finest: per_unit(FINEST),
+    })
+}
+
 /// The finest frequency of a mesh, rad per mean edge: two edges are one wavelength.
 const FINEST: f64 = PI;
 

@@ -23,13 +23,17 @@
 //!   most 2^25 numbers are kept: on larger meshes the pairs end earlier.
 //! - `Auto` takes eigenpairs for a Box, a Normalized, and a curve as steep as a box, and Krylov for all else.
 //!
+//! The setting `signal: Irradiance` filters light instead: what falls on the vertices, shadows and all, spreads over the edges
+//! of shadows, which filtered normals leave as they are, and none of it is lost. It needs eigenpairs to where the kernel has
+//! ended, and in every frame two passes over all modes of all vertices: `scenes/shadow-edge.ron`.
+//!
 //! Costs: the bake; after it a frame costs exactly what `Opaque` costs, with the same steps, and one pass over the
 //! vertices when the kernel is edited: that is the method's point. On the device lie two bytes per vertex and mode (at most
 //! 81 modes by Krylov) and 32 more per vertex. A kernel that differs between channels has three normals: each light and
 //! the surroundings are then gathered three times.
 //!
-//! Fails where light crosses the inside: thin parts stay dark against the light, and a shadow's edge stays sharp, since
-//! only the normals are filtered and not the light. `scenes/first-light.ron` shows it in the ears. Shadows are looked up a
+//! Fails where light crosses the inside: thin parts stay dark against the light, as `scenes/first-light.ron` shows in the
+//! ears; and a shadow's edge stays sharp where normals are filtered and not the light. Shadows are looked up a
 //! scattering length above the surface, or an object would shade its own terminator where its smoothed normals still face
 //! the light.
 //!
@@ -41,6 +45,7 @@
 //! ```
 
 mod kernel;
+mod light;
 mod steps;
 
 use super::local::{self, Normals};
@@ -62,6 +67,16 @@ use steps::{ENDS_STRIDE, HarmonicNormals, KernelWeights, KrylovNormals, Neighbou
 #[serde(default, deny_unknown_fields)]
 pub struct FilteredNormals {
     engine: Engine,
+    signal: Signal,
+}
+
+/// What is filtered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+enum Signal {
+    #[default]
+    Normals,
+    /// At the vertices, with shadows.
+    Irradiance,
 }
 
 /// How frequencies on the mesh are told apart.
@@ -75,15 +90,29 @@ enum Engine {
 
 impl Technique for FilteredNormals {
     fn plan(&self, plan: &mut Plan, surface: &Surface) -> Result<Scattered, Problem> {
-        local::scatter(plan, surface, |plan, member| self.normals(plan, surface, member))
+        match self.signal {
+            Signal::Normals => local::scatter(plan, surface, |plan, member| self.normals(plan, surface, member)),
+            Signal::Irradiance => {
+                local::scatter_known(plan, surface, |plan, member| self.irradiance(plan, surface, member))
+            }
+        }
     }
 
     fn entry_mm(&self, material: &Material) -> f64 {
+        if self.signal == Signal::Irradiance {
+            return 0.0;
+        }
         Kernels::of(material, f64::INFINITY).map_or(0.0, |kernels| kernels.reach())
     }
 
     fn refuses(&self, material: &Material) -> Option<Problem> {
-        let Some(Kernels::Spectral(kernels)) = Kernels::of(material, 1.0) else { return None };
+        let kernels = Kernels::of(material, 1.0)?;
+        if self.signal == Signal::Irradiance {
+            let needs_pairs = ("a basis that is made for normals does not hold light", "leave out engine: Krylov");
+            let refusal = light::refusal(&kernels).or((self.engine == Engine::Krylov).then_some(needs_pairs));
+            return refusal.map(|(what, hint)| material.problem("filter", what).hint(hint));
+        }
+        let Kernels::Spectral(kernels) = kernels else { return None };
         let is_steep = kernels.iter().any(|kernel| !kernel.is_smooth());
         (self.engine == Engine::Krylov && is_steep).then(|| {
             material
@@ -119,6 +148,20 @@ impl FilteredNormals {
         }
     }
 
+    fn irradiance(&self, plan: &mut Plan, surface: &Surface, member: &Member) -> Result<Slot<Buffer>, Problem> {
+        if let Some(problem) = self.refuses(member.material) {
+            return Err(problem);
+        }
+        let (mm_per_unit, extent) = (surface.mm_per_unit(), surface.extent(member));
+        match Kernels::of(member.material, 0.5 * extent * mm_per_unit) {
+            Some(Kernels::Spectral(kernels)) => {
+                let highest = highest(&kernels, extent, mm_per_unit);
+                light::filtered(plan, surface, member, &kernels, highest)
+            }
+            _ => surface.irradiance(plan, member, member.mesh),
+        }
+    }
+
     /// The bake. All that its key has of the kernels is a coarse step of their widths.
     fn basis(
         &self,
@@ -139,8 +182,7 @@ impl FilteredNormals {
             }),
         };
         if let Some(why) = why {
-            let ends = kernels.each_ref().map(|kernel| kernel.end().map_or(f64::MAX, per_unit));
-            let highest = steps_of(ends.map(|end| end * extent)).1 / extent;
+            let highest = highest(kernels, extent, mm_per_unit);
             return plan.bake(HarmonicNormals { mesh, highest, why });
         }
         let band = match kernels {
@@ -156,6 +198,14 @@ impl FilteredNormals {
         };
         plan.bake(KrylovNormals { mesh, band })
     }
+}
+
+/// A frequency above all that kernels let pass, rad per unit; in steps of the root of 2, which is twice the pairs.
+fn highest(kernels: &[Kernel; 3], extent: f64, mm_per_unit: f64) -> f64 {
+    let ends = kernels.each_ref().map(|kernel| kernel.end().map_or(f64::MAX, |end| end * mm_per_unit * extent));
+    let end = ends.into_iter().fold(0.0, f64::max);
+    let step = (2.0 * end.log2()).ceil().clamp(0.0, 48.0);
+    2f64.powf(0.5 * step) / extent
 }
 
 /// The powers of 4 around some numbers, between those that mean anything on a mesh.

@@ -11,7 +11,7 @@ use glam::Vec3;
 use half::f16;
 use serde::Serialize;
 
-const CODE: &[&str] = &["src/geometry/", "src/techniques/filtered_normals/"];
+pub(super) const CODE: &[&str] = &["src/geometry/", "src/techniques/filtered_normals/"];
 
 /// Normals after Patro's neighbour kernel.
 #[derive(Serialize)]
@@ -100,8 +100,26 @@ impl Bake for HarmonicNormals {
     const CODE: &'static [&'static str] = CODE;
 }
 
-/// The modes of a basis on the device, two halves a word: modes 2p and 2p + 1 of sample i are word p stride + i, where
-/// `stride` is the number of samples up to a multiple of 4.
+/// Modes as the device has them, two halves a word: modes 2p and 2p + 1 of sample i are word p stride + i.
+pub(super) fn halves(columns: &[f32], samples: usize) -> Vec<u32> {
+    let mut words = Vec::with_capacity(columns.len() / 2);
+    for pair in columns.chunks(2 * samples.max(1)) {
+        let (low, high) = pair.split_at(samples);
+        let half = |column: &[f32], i: usize| column.get(i).map_or(0, |v| f16::from_f32(*v).to_bits() as u32);
+        words.extend((0..stride(samples)).map(|i| match i < samples {
+            true => half(low, i) | half(high, i) << 16,
+            false => 0,
+        }));
+    }
+    words
+}
+
+/// Samples of a mode, up to a multiple of a workgroup.
+pub(super) fn stride(samples: usize) -> usize {
+    samples.next_multiple_of(64)
+}
+
+/// The modes of a basis on the device.
 #[derive(Serialize)]
 pub(super) struct UploadModes {
     pub basis: Slot<Basis>,
@@ -117,17 +135,7 @@ impl Step for UploadModes {
     }
     fn run(&self, run: &Run) -> Result<Buffer, Problem> {
         let basis = run.get(self.basis);
-        let stride = basis.samples.next_multiple_of(4);
-        let mut words = Vec::with_capacity(stride * basis.omega.len().div_ceil(2));
-        for pair in basis.columns.chunks(2 * basis.samples.max(1)) {
-            let (low, high) = pair.split_at(basis.samples);
-            let half = |column: &[f32], i: usize| column.get(i).map_or(0, |v| f16::from_f32(*v).to_bits() as u32);
-            words.extend((0..stride).map(|i| match i < basis.samples {
-                true => half(low, i) | half(high, i) << 16,
-                false => 0,
-            }));
-        }
-        Ok(Buffer::new(run.host::<Gpu>(), bytemuck::cast_slice(&words)))
+        Ok(Buffer::new(run.host::<Gpu>(), bytemuck::cast_slice(&halves(&basis.columns, basis.samples))))
     }
 }
 
