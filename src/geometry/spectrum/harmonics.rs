@@ -32,7 +32,7 @@ const BLOCK: usize = 8;
 const REPEATED: f64 = 1e-5;
 
 /// A pair's residual |L y - lambda y|, of the band's upper end.
-const RESIDUAL: f64 = 1e-7;
+const RESIDUAL: f64 = 1e-6;
 
 /// The modes of a field at the samples up to the frequency `cut` (rad per edge), and where they end: a little above, so
 /// that no repeated eigenvalue is cut, or far below if there is no room for more.
@@ -152,7 +152,8 @@ impl Slicer<'_> {
             return Ok(Some((Vec::new(), Vec::new())));
         }
         let n = self.laplacian.samples();
-        let shift = 0.5 * (from + to);
+        // Not on an eigenvalue, whose inverse would drown all others.
+        let (shift, _) = self.end_of_band(0.5 * (from + to))?;
         let factor = self.factor(shift)?;
         let known_count = known.len() / n;
         let most = (3 * count + 12 * BLOCK).min(n - self.laplacian.components());
@@ -198,7 +199,8 @@ impl Slicer<'_> {
                 let inside: Vec<usize> = (0..size)
                     .filter(|&k| inverse[k] != 0.0 && (from..to).contains(&(shift + 1.0 / inverse[k])))
                     .collect();
-                let converged = inside.iter().all(|&k| left(k) < 1e-9 * inverse[k].abs());
+                let largest = inverse.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+                let converged = inside.iter().all(|&k| left(k) < 1e-9 * inverse[k].abs() + 1e-13 * largest);
                 if inside.len() == count && (converged || is_whole) {
                     let basis = space.columns().subcols(first, size);
                     return self.accept(basis, &vectors, &inside, &inverse, shift, to, &space);
