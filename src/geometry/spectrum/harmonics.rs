@@ -10,18 +10,15 @@ use glam::DVec3;
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::Rng;
 
-use super::Modes;
 use super::factor::{Factor, Pattern};
 use super::krylov::{add_areas, breakdown, eigen};
 use super::space::{Space, length};
+use super::{MOST, Modes};
 use crate::geometry::laplacian::Laplacian;
 use crate::problem::{Problem, Tick};
 
 /// Meshes with fewer samples are taken apart as a whole.
 const SMALL: usize = 700;
-
-/// Numbers in all modes together, at most: 2^25, which is 64 MiB as halves on a device.
-const MOST: usize = 1 << 25;
 
 /// Pairs that a band is meant to have, and columns of a block: an eigenvalue repeated more often is found all the same,
 /// with more steps.

@@ -13,10 +13,10 @@ use faer::{Mat, MatRef, Side};
 use glam::DVec3;
 use sprs::{CsMat, TriMat};
 
-use super::Modes;
 use super::factor::{Factor, Pattern};
 use super::kernel::Kernel;
 use super::space::{Space, length};
+use super::{MOST, Modes};
 use crate::geometry::laplacian::Laplacian;
 use crate::problem::{Cause, Problem, Tick};
 
@@ -32,7 +32,8 @@ const CHECK: usize = 2;
 pub fn modes(laplacian: &Laplacian, field: &[DVec3], band: (f64, f64), tick: Tick) -> Result<(Modes, f64), Problem> {
     let mut space = Projected::new(laplacian, field);
     let band = within(band, laplacian);
-    let mut error = 0.0;
+    // Nothing, if all is constant; else unknown until two spaces were compared.
+    let mut error = (space.size() > 0) as u32 as f64;
     if space.size() > 0 {
         let pattern = Pattern::of(&laplacian.stiffness)?;
         let poles = poles(band);
@@ -43,7 +44,7 @@ pub fn modes(laplacian: &Laplacian, field: &[DVec3], band: (f64, f64), tick: Tic
             tick(0.2 * factors.len() as f64 / poles.len() as f64)?;
         }
         let mut last: Option<Vec<Mat<f64>>> = None;
-        for step in 1..STEPS {
+        for step in 1..space.steps() {
             let is_whole = !space.grow(&factors[(step - 1) % factors.len()]);
             if is_whole {
                 error = 0.0;
@@ -115,7 +116,7 @@ struct Projected<'a> {
 impl Projected<'_> {
     fn new<'a>(laplacian: &'a Laplacian, field: &[DVec3]) -> Projected<'a> {
         let n = laplacian.samples();
-        let columns = (3 * STEPS).min(n);
+        let columns = 3 * STEPS.min(MOST / (3 * n.max(1))).max(1);
         let mut space = Space::new(laplacian, columns);
         let means = laplacian.means(field);
         let block = Mat::from_fn(n, 3, |i, c| space.root[i] * (field[i] - means[i])[c]);
@@ -133,6 +134,11 @@ impl Projected<'_> {
 
     fn size(&self) -> usize {
         self.space.size
+    }
+
+    /// Blocks that there is room for.
+    fn steps(&self) -> usize {
+        self.laplacian.nrows() / 3
     }
 
     /// Adds what a solve makes of the last block. False when that is nothing new: the space is whole.

@@ -225,6 +225,9 @@ pub fn all_harmonics(mesh: &Mesh, highest: f64, tick: Tick) -> Result<Harmonics,
     })
 }
 
+/// Numbers in all modes together, at most: 64 MiB as halves on a device, four times that while they are made.
+const MOST: usize = 1 << 25;
+
 /// The finest frequency of a mesh, rad per mean edge: two edges are one wavelength.
 const FINEST: f64 = PI;
 

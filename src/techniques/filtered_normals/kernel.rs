@@ -12,7 +12,7 @@ pub(super) enum Kernels {
 
 /// Scattering that reaches farther than this share of half the object's size would average the normals of a closed object
 /// to nothing, as it never does with light: this is as far as the medium's own kernel goes.
-const FARTHEST: f64 = 0.5;
+const FARTHEST: f64 = 1.0 / 3.0;
 
 impl Kernels {
     /// For an object half of whose size is `half`, mm. None for what is opaque.

@@ -7,7 +7,7 @@
 //!   frequencies on the surface, in mm: the same on any mesh of the same shape.
 //! - `Normalized(std:)` is the paper's own Gaussian, whose axis the mesh's edges decide.
 //! - `FromMedium()`, the default, is (1 + (omega/sigma_tr)²)^(-3/2) with the medium's sigma_tr, per channel. A sigma_tr below
-//!   4 / size counts as that: normals average to nothing over a closed object, which light never does.
+//!   6 / size counts as that: normals average to nothing over a closed object, which light never does.
 //! - `Neighbours(…)` sums over the vertices within `radius` with weights exp(-sigma_tr r), plus `alpha` of the own normal
 //!   [Patro2007, eq. 3]. `weights: Area` gives every neighbour the area that it stands for, so that a re-triangulated mesh
 //!   gives the same field; `Uniform` is the literal equation, which does not: `scenes/neighbours-and-spectrum.ron`.
@@ -19,8 +19,7 @@
 //!   whole spectrum, on slivers too. The bake takes about ten solves of a sparse system; it is made for a step of widths, a
 //!   factor of 4, so that an edit within it finds it there.
 //! - `Harmonics` finds the eigenpairs of the mesh up to the paper's omega_m (a wavelength of ten edges) or to where the
-//!   kernel has ended; what lies above is weighted as a whole [Patro2007, eq. 11]. The bake is a hundred times longer. At
-//!   most 2^25 numbers are kept: on larger meshes the pairs end earlier.
+//!   kernel has ended; what lies above is weighted as a whole [Patro2007, eq. 11]. The bake is a hundred times longer.
 //! - `Auto` takes eigenpairs for a Box, a Normalized, and a curve as steep as a box, and Krylov for all else.
 //!
 //! The setting `signal: Irradiance` filters light instead: what falls on the vertices, shadows and all, spreads over the edges
@@ -29,7 +28,7 @@
 //!
 //! Costs: the bake; after it a frame costs exactly what `Opaque` costs, with the same steps, and one pass over the
 //! vertices when the kernel is edited: that is the method's point. On the device lie two bytes per vertex and mode (at most
-//! 81 modes by Krylov) and 32 more per vertex. A kernel that differs between channels has three normals: each light and
+//! 81 modes by Krylov; 64 MiB in all, and where that is less than there should be, modes end earlier) and 32 per vertex. A kernel that differs between channels has three normals: each light and
 //! the surroundings are then gathered three times.
 //!
 //! Fails where light crosses the inside: thin parts stay dark against the light, as `scenes/first-light.ron` shows in the
