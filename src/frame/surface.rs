@@ -98,7 +98,14 @@ impl<'a> Surface<'a> {
         member: &Member,
         normals: Slot<Buffer>,
     ) -> Result<Option<Slot<Buffer>>, Problem> {
-        self.frame.sky_irradiance(plan, self.item(member), normals)
+        self.frame.sky_irradiance(plan, self.item(member), member.mesh, normals)
+    }
+
+    /// Transmitted irradiance at points of a member's surface, `vec4f` each with 0 for w: what `environment` and all lamps
+    /// send in, with their shadows, W/m². The points are the vertices of a mesh in the member's space: its own mesh, for
+    /// its own vertices, or any other, of which the triangles do not matter.
+    pub fn irradiance(&self, plan: &mut Plan, member: &Member, points: Slot<Mesh>) -> Result<Slot<Buffer>, Problem> {
+        self.frame.irradiance(plan, member.place, points)
     }
 
     /// The mesh's own normals, as a vertex stream.

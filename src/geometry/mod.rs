@@ -6,6 +6,8 @@
 pub mod bvh;
 pub mod clearance;
 pub mod deform;
+mod intrinsic;
+pub mod laplacian;
 pub mod mesh;
 pub mod nearest;
 pub mod neighbours;
@@ -14,4 +16,5 @@ pub mod obj;
 mod polygon;
 pub mod sculpture;
 pub mod shapes;
+pub mod spectrum;
 pub mod visibility;

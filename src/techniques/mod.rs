@@ -63,7 +63,7 @@ macro_rules! entry {
 /// Every technique there is.
 pub const REGISTRY: &[Entry] = &[
     entry!(opaque, Opaque),
-    entry!(filtered_normals, FilteredNormals),
+    entry!(filtered_normals, FilteredNormals, "FilteredNormals(engine: Harmonics)"),
     Entry {
         name: Reference::NAME,
         manual: include_str!("reference.rs"),
