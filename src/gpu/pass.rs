@@ -149,6 +149,14 @@ pub struct Dispatch {
     pub binds: Vec<(&'static str, Bind)>,
 }
 
+/// How many elements a buffer has.
+#[derive(Clone, Copy, Serialize)]
+pub enum Count {
+    Known(u64),
+    /// As many as another, whose elements are so many bytes long.
+    Of(Slot<Buffer>, u32),
+}
+
 /// Runs a compute shader several times over one buffer of `count` elements, which begins as zeros: each dispatch sees
 /// what those before it wrote.
 #[derive(Serialize)]
@@ -160,7 +168,7 @@ pub struct Dispatches {
     pub shader: Shader,
     /// The name of the shader's output, and the bytes of one of its elements.
     pub output: (&'static str, u32),
-    pub count: u64,
+    pub count: Count,
     pub dispatches: Vec<Dispatch>,
     pub binds: Vec<(&'static str, Bind)>,
 }
@@ -189,7 +197,11 @@ impl Step for Dispatches {
         self.about.clone()
     }
     fn run(&self, run: &Run) -> Result<Buffer, Problem> {
-        compute(run, self.name, &self.shader, self.output, self.count, &self.dispatches, &self.binds)
+        let count = match self.count {
+            Count::Known(count) => count,
+            Count::Of(other, stride) => run.get(other).bytes / stride as u64,
+        };
+        compute(run, self.name, &self.shader, self.output, count, &self.dispatches, &self.binds)
     }
 }
 

@@ -5,9 +5,12 @@
 //! module's header is its manual, and `diaphane techniques NAME` prints it.
 
 mod filtered_normals;
+mod kernel;
 mod local;
 mod opaque;
 pub mod reference;
+mod screen;
+mod screen_space;
 
 use crate::frame::Surface;
 use crate::gpu::Images;
@@ -64,6 +67,7 @@ macro_rules! entry {
 pub const REGISTRY: &[Entry] = &[
     entry!(opaque, Opaque),
     entry!(filtered_normals, FilteredNormals),
+    entry!(screen_space, ScreenSpace, "ScreenSpace(layers: 6)", "ScreenSpace(n_l: 8)", "ScreenSpace(brighten: Paper)"),
     Entry {
         name: Reference::NAME,
         manual: include_str!("reference.rs"),
@@ -74,12 +78,11 @@ pub const REGISTRY: &[Entry] = &[
 ];
 
 /// Techniques that a scene may name one day.
-const LATER: [&str; 11] = [
+const LATER: [&str; 10] = [
     "SphericalThickness",
     "DepthMapThickness",
     "PrecomputedTransfer",
     "LongRange",
-    "ScreenSpace",
     "DeepScreenSpace",
     "MultiresolutionSplatting",
     "SeparableScreenSpace",

@@ -137,8 +137,9 @@ impl DiskMeans {
             .map(|profile| {
                 let x = |knot: usize| (first + (knot as f64 - BELOW as f64) * step).exp();
                 // hi is at most sqrt(2) rho.
-                let density: Vec<f64> =
-                    (0..BELOW + rows * FINE + 40).map(|knot| x(knot) * x(knot) * profile.r_d_tabulated(x(knot))).collect();
+                let density: Vec<f64> = (0..BELOW + rows * FINE + 40)
+                    .map(|knot| x(knot) * x(knot) * profile.r_d_tabulated(x(knot)))
+                    .collect();
                 let mut sum = 2.0 * PI * density[0];
                 let mut within = vec![sum];
                 for pair in density.windows(2) {
@@ -199,8 +200,7 @@ mod tests {
 
     fn profiles(model: Model, albedos: [f64; 3]) -> [Profile; 3] {
         albedos.map(|albedo| {
-            let channel =
-                Channel { sigma_a: 1.0 - albedo, sigma_s: albedo, g: 0.0, phase: Phase::HenyeyGreenstein };
+            let channel = Channel { sigma_a: 1.0 - albedo, sigma_s: albedo, g: 0.0, phase: Phase::HenyeyGreenstein };
             Profile::new(model, channel, 1.33)
         })
     }
