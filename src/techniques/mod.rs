@@ -7,6 +7,7 @@
 mod filtered_normals;
 mod kernel;
 mod local;
+mod long_range;
 mod opaque;
 pub mod reference;
 mod screen;
@@ -78,11 +79,10 @@ pub const REGISTRY: &[Entry] = &[
 ];
 
 /// Techniques that a scene may name one day.
-const LATER: [&str; 10] = [
+const LATER: [&str; 9] = [
     "SphericalThickness",
     "DepthMapThickness",
     "PrecomputedTransfer",
-    "LongRange",
     "DeepScreenSpace",
     "MultiresolutionSplatting",
     "SeparableScreenSpace",
