@@ -46,7 +46,7 @@ fn disk_mean(r: f32, a: f32) -> vec3f {
 // Per area, for a disk that may lie at any angle: `offset` leads from its middle to where light leaves. What the disk
 // extends along that line counts as in a plane; what it extends across makes its points farther away, all alike.
 fn disk_mean_across(offset: vec3f, normal: vec3f, a: f32) -> vec3f {
-    let squared = max(dot(offset, offset), 1e-30);
+    let squared = max(dot(offset, offset), 1e-6 * a * a);
     let height = dot(offset, normal);
     let level = sqrt(max(0.0, 1.0 - height * height / squared));
     let across = 0.5 * a * a * (1.0 - level * level);

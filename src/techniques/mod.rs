@@ -68,6 +68,14 @@ macro_rules! entry {
 pub const REGISTRY: &[Entry] = &[
     entry!(opaque, Opaque),
     entry!(filtered_normals, FilteredNormals),
+    entry!(
+        long_range,
+        LongRange,
+        "LongRange(layers: 6)",
+        "LongRange(splats: 500)",
+        "LongRange(splats: 8000)",
+        "LongRange(brighten: Paper)"
+    ),
     entry!(screen_space, ScreenSpace, "ScreenSpace(layers: 6)", "ScreenSpace(n_l: 8)", "ScreenSpace(brighten: Paper)"),
     Entry {
         name: Reference::NAME,

@@ -126,20 +126,18 @@ fn far(
     let irradiance = surface.irradiance(plan, member, points)?;
     let [positions, normals] = surface.points(plan, points);
     let areas = plan.add(UploadAreas { mesh: member.mesh, patches, of_groups: false });
-    let starts = plan.add(UploadPatches { patches, list: List::Starts });
-    let groups = plan.add(UploadPatches { patches, list: List::Groups });
+    let spans = plan.add(UploadPatches { patches, list: List::Spans });
     let splats = plan.add(Compute {
         name: "long_range.splats",
         about: format!("the light of each patch of `{}` that is not seen", member.name),
         shader: surface.shader("techniques/long_range/splats.wgsl", &[])?,
         output: ("splats", 48),
-        over: groups,
-        over_stride: 4,
+        over: spans,
+        over_stride: 12,
         binds: vec![
             whose(),
             ("objects", surface.objects()),
-            ("starts", Bind::Buffer(starts)),
-            ("groups", Bind::Buffer(groups)),
+            ("spans", Bind::Buffer(spans)),
             ("areas", Bind::Buffer(areas)),
             ("positions", Bind::Buffer(positions)),
             ("normals", Bind::Buffer(normals)),

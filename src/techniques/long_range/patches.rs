@@ -178,8 +178,8 @@ pub(super) struct UploadPatches {
 
 #[derive(Clone, Copy, Serialize)]
 pub(super) enum List {
-    Starts,
-    Groups,
+    /// Per patch: where its leaves begin and end, and its group.
+    Spans,
     /// As floats: a vertex stream.
     OfVertex,
 }
@@ -196,8 +196,11 @@ impl Step for UploadPatches {
         let patches = run.get(self.patches);
         let gpu: &Gpu = run.host();
         Ok(match self.list {
-            List::Starts => Buffer::new(gpu, bytemuck::cast_slice(&patches.starts)),
-            List::Groups => Buffer::new(gpu, bytemuck::cast_slice(&patches.groups)),
+            List::Spans => {
+                let span = |(pair, group): (&[u32], &u32)| [pair[0], pair[1], *group];
+                let spans: Vec<[u32; 3]> = patches.starts.windows(2).zip(&patches.groups).map(span).collect();
+                Buffer::new(gpu, bytemuck::cast_slice(&spans))
+            }
             List::OfVertex => {
                 let floats: Vec<f32> = patches.of_vertex.iter().map(|&group| group as f32).collect();
                 Buffer::new(gpu, bytemuck::cast_slice(&floats))
