@@ -5,7 +5,7 @@ use crate::geometry::mesh::Mesh;
 use crate::gpu::{Bind, Buffer, Draw, Format, Gpu, Images, Shader, Shape};
 use crate::image::Texture;
 use crate::problem::{Problem, counted};
-use crate::scene::{AsNumber, Material, TextureMap, Varying};
+use crate::scene::{AsNumber, Material, Object, TextureMap, Varying, shape};
 use crate::store::{Key, Plan, Run, Slot, Step};
 use glam::Vec3;
 use half::f16;
@@ -116,6 +116,34 @@ impl<'a> Surface<'a> {
     /// A vector per vertex, as a vertex stream.
     pub fn upload(&self, plan: &mut Plan, vectors: Slot<Vec<Vec3>>) -> Slot<Buffer> {
         upload::list(plan, vectors, "a vector per vertex")
+    }
+
+    /// A member's place in the table of objects.
+    pub fn place(&self, member: &Member) -> u32 {
+        member.place as u32
+    }
+
+    /// A list, on the device as it is.
+    pub fn upload_list<T>(&self, plan: &mut Plan, values: Slot<Vec<T>>, about: &'static str) -> Slot<Buffer>
+    where
+        T: bytemuck::Pod + Send + Sync,
+    {
+        upload::list(plan, values, about)
+    }
+
+    /// The positions of a mesh's vertices, then their normals, as vertex streams.
+    pub fn points(&self, plan: &mut Plan, mesh: Slot<Mesh>) -> [Slot<Buffer>; 2] {
+        [upload::Stream::Positions, upload::Stream::Normals].map(|stream| upload::stream(plan, mesh, stream))
+    }
+
+    /// A member's mesh before it was deformed, vertex by vertex and triangle by triangle the same: what is baked from it
+    /// holds at all times.
+    pub fn rest(&self, plan: &mut Plan, member: &Member) -> Slot<Mesh> {
+        let object = self.frame.object(self.item(member)).expect("a member is an object");
+        match object.deform.is_empty() {
+            true => member.mesh,
+            false => shape::mesh(plan, &Object { deform: Vec::new(), ..object.clone() }, 0.0),
+        }
     }
 
     /// The member, to be drawn with the given streams after its positions.

@@ -5,9 +5,13 @@
 //! module's header is its manual, and `diaphane techniques NAME` prints it.
 
 mod filtered_normals;
+mod kernel;
 mod local;
+mod long_range;
 mod opaque;
 pub mod reference;
+mod screen;
+mod screen_space;
 
 use crate::frame::Surface;
 use crate::gpu::Images;
@@ -64,6 +68,15 @@ macro_rules! entry {
 pub const REGISTRY: &[Entry] = &[
     entry!(opaque, Opaque),
     entry!(filtered_normals, FilteredNormals, "FilteredNormals(engine: Harmonics)"),
+    entry!(
+        long_range,
+        LongRange,
+        "LongRange(layers: 6)",
+        "LongRange(splats: 500)",
+        "LongRange(splats: 8000)",
+        "LongRange(brighten: Paper)"
+    ),
+    entry!(screen_space, ScreenSpace, "ScreenSpace(layers: 6)", "ScreenSpace(n_l: 8)", "ScreenSpace(brighten: Paper)"),
     Entry {
         name: Reference::NAME,
         manual: include_str!("reference.rs"),
@@ -74,12 +87,10 @@ pub const REGISTRY: &[Entry] = &[
 ];
 
 /// Techniques that a scene may name one day.
-const LATER: [&str; 11] = [
+const LATER: [&str; 9] = [
     "SphericalThickness",
     "DepthMapThickness",
     "PrecomputedTransfer",
-    "LongRange",
-    "ScreenSpace",
     "DeepScreenSpace",
     "MultiresolutionSplatting",
     "SeparableScreenSpace",
