@@ -17,4 +17,5 @@ mod polygon;
 pub mod sculpture;
 pub mod shapes;
 pub mod spectrum;
+pub mod thickness;
 pub mod visibility;

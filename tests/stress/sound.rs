@@ -9,7 +9,7 @@ use half::f16;
 use std::collections::HashSet;
 
 /// Steps that make something else than light, by the beginning of their names: what they make may be negative.
-const SIGNED: [(&str, &str); 10] = [
+const SIGNED: [(&str, &str); 12] = [
     ("geometry.", "positions and normals"),
     ("filtered_normals.", "normals"),
     ("frame.gbuffer", "positions"),
@@ -20,6 +20,8 @@ const SIGNED: [(&str, &str); 10] = [
     ("long_range.splats", "places, normals, and area that pixels counted too much"),
     ("long_range.far", "the pixel that a block's light is for, -1 for none, beside the light"),
     ("sky.light", "directions, beside the light from there"),
+    ("sky.harmonics", "spherical harmonics of light"),
+    ("thickness.", "spherical harmonics"),
 ];
 
 /// Steps whose halves stand for whatever is brighter, too: a sun in a sky's image.
