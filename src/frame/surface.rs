@@ -28,6 +28,13 @@ pub struct Member<'a> {
     pub mesh: Slot<Mesh>,
 }
 
+impl Member<'_> {
+    /// Its place in the table of [`Surface::objects`].
+    pub fn place(&self) -> usize {
+        self.place
+    }
+}
+
 impl<'a> Surface<'a> {
     pub fn mm_per_unit(&self) -> f64 {
         self.frame.scene.mm_per_unit

@@ -5,6 +5,7 @@
 //! module's header is its manual, and `diaphane techniques NAME` prints it.
 
 mod filtered_normals;
+mod layered;
 mod local;
 mod opaque;
 pub mod reference;
@@ -64,6 +65,15 @@ macro_rules! entry {
 pub const REGISTRY: &[Entry] = &[
     entry!(opaque, Opaque),
     entry!(filtered_normals, FilteredNormals),
+    entry!(
+        layered,
+        Layered,
+        "Layered(samples: 4)",
+        "Layered(samples: 10, march: Uniform)",
+        "Layered(samples: 50, march: Uniform)",
+        "Layered(samples: 100, march: Uniform)",
+        "Layered(refract: false)"
+    ),
     Entry {
         name: Reference::NAME,
         manual: include_str!("reference.rs"),
@@ -74,7 +84,7 @@ pub const REGISTRY: &[Entry] = &[
 ];
 
 /// Techniques that a scene may name one day.
-const LATER: [&str; 11] = [
+const LATER: [&str; 10] = [
     "SphericalThickness",
     "DepthMapThickness",
     "PrecomputedTransfer",
@@ -84,7 +94,6 @@ const LATER: [&str; 11] = [
     "MultiresolutionSplatting",
     "SeparableScreenSpace",
     "AdjacencyMaps",
-    "Layered",
     "Auto",
 ];
 
