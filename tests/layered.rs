@@ -39,13 +39,19 @@ impl Medium {
     fn text(&self) -> String {
         let v = |v: DVec3| format!("({:?}, {:?}, {:?})", v.x, v.y, v.z);
         // A file gives what its phase function is named after: Schlick's k for Schlick.
-        format!("medium: Coefficients(sigma_a: {}, sigma_s: {}, g: {:?}), phase: {:?}",
-            v(self.sigma_a), v(self.sigma_s), self.parameter, self.phase)
+        format!(
+            "medium: Coefficients(sigma_a: {}, sigma_s: {}, g: {:?}), phase: {:?}",
+            v(self.sigma_a),
+            v(self.sigma_s),
+            self.parameter,
+            self.phase
+        )
     }
 }
 
 fn material(ior: f64, layers: &[(Medium, String)], below: Medium) -> String {
-    let layers: String = layers.iter().map(|(medium, depth)| format!("({}, depth: {depth}), ", medium.text())).collect();
+    let layers: String =
+        layers.iter().map(|(medium, depth)| format!("({}, depth: {depth}), ", medium.text())).collect();
     format!("Material(version: 1, surface: (ior: {ior:?}, roughness: 0.3), {}, layers: [{layers}])", below.text())
 }
 
@@ -86,7 +92,8 @@ fn once(ior: f64, bend: f64, view: DVec3, to_light: DVec3, layers: &[(Medium, f6
     let (to_eye, to_light_in) = (below_surface(-view), below_surface(to_light));
     let (out, into) = (to_eye.y, to_light_in.y);
     let width = if bend == 1.0 { 1.0 } else { to_light.y / into };
-    let through = (1.0 - fresnel_dielectric(-view.y, ior)) * (1.0 - fresnel_dielectric(to_light.y, ior)) * width / (bend * bend);
+    let through =
+        (1.0 - fresnel_dielectric(-view.y, ior)) * (1.0 - fresnel_dielectric(to_light.y, ior)) * width / (bend * bend);
     let (mut sum, mut passed, mut top) = (DVec3::ZERO, DVec3::ZERO, 0.0);
     for (medium, bottom) in layers.iter().copied().chain([(below, f64::INFINITY)]) {
         let rate = medium.sigma_t() * (1.0 / out + 1.0 / into);
@@ -136,9 +143,16 @@ fn a_stack_of_layers_has_its_closed_form_in_few_steps() {
             studio.write("thing.ron", material(ior, &constant(layers), FLESH));
             let bend = if refract { ior } else { 1.0 };
             for samples in [1, 5] {
-                let image = scattered(&mut studio, &slab(ABOVE, SUN, &format!("Layered(samples: {samples}, refract: {refract})")));
+                let image = scattered(
+                    &mut studio,
+                    &slab(ABOVE, SUN, &format!("Layered(samples: {samples}, refract: {refract})")),
+                );
                 let error = error(&image, ABOVE, |view| once(ior, bend, view, to_sun(), layers, FLESH));
-                assert!(error < 3e-3, "{} layers, ior {ior}, refract {refract}, {samples} steps: {error:.2e}", layers.len());
+                assert!(
+                    error < 3e-3,
+                    "{} layers, ior {ior}, refract {refract}, {samples} steps: {error:.2e}",
+                    layers.len()
+                );
             }
         }
     }
@@ -182,7 +196,10 @@ fn layers_that_are_none_change_nothing() {
     let (whole, bright) = (of(&[], SKIN), 0.02);
     assert!(mean(&whole) > bright);
     assert!(most_apart(&whole, &of(&[(SKIN, 0.3)], SKIN)) < 2e-3 * bright);
-    assert!(most_apart(&whole, &of(&[(SKIN, 0.1), (SKIN, 0.2), (SKIN, 0.3), (SKIN, 0.5), (SKIN, 1.0)], SKIN)) < 2e-3 * bright);
+    assert!(
+        most_apart(&whole, &of(&[(SKIN, 0.1), (SKIN, 0.2), (SKIN, 0.3), (SKIN, 0.5), (SKIN, 1.0)], SKIN))
+            < 2e-3 * bright
+    );
     // Split in two.
     let two = of(&[(SKIN, 0.3), (FLESH, 0.8)], SKIN);
     assert!(most_apart(&two, &of(&[(SKIN, 0.1), (SKIN, 0.3), (FLESH, 0.8)], SKIN)) < 2e-3 * bright);
@@ -320,7 +337,10 @@ fn an_edit_of_a_map_or_a_layer_bakes_nothing() {
     // Steps, bent rays and lamps are no business of bakes.
     for technique in ["Layered(samples: 20)", "Layered(refract: false)", "Layered(march: Uniform)"] {
         let made = of(plan(&layers, &slab(ABOVE, SUN, technique)));
-        assert!(made.keys().all(|name| ["frame.compose", "frame.image", "technique.layered"].contains(name)), "{made:?}");
+        assert!(
+            made.keys().all(|name| ["frame.compose", "frame.image", "technique.layered"].contains(name)),
+            "{made:?}"
+        );
     }
     // Without images nothing of a map is planned.
     let plain = plan(&constant(&[(SKIN, 0.4)]), &scene);

@@ -190,15 +190,20 @@ fn depth_of(ray: Ray, wanted: f32, of_clearest: bool) -> f32 {
     return top;
 }
 
-// Two optical depths, straight down to the depths `h`, under M and where light enters alike [eq. 12].
-fn optical_depths(ray: Ray, uv_m: vec2f, uv_k: vec2f, h: vec2f) -> mat2x3f {
+// Two optical depths, straight down to the depths `h`, under M and where light enters alike [eq. 12]. `first` are the first
+// four depths at M.
+fn optical_depths(ray: Ray, uv_m: vec2f, first: vec4f, uv_k: vec2f, h: vec2f) -> mat2x3f {
     let count = ray.stack.last - ray.stack.first;
     let deepest = max(h.x, h.y);
     var sum = mat2x3f(vec3f(0.0), vec3f(0.0));
     var top = 0.0;
     var ends = vec4f(0.0);
     for (var j = 0u; j <= count; j++) {
-        if (j & 3u) == 0u { ends = 0.5 * (depths(ray, uv_m, j) + depths(ray, uv_k, j)); }
+        if (j & 3u) == 0u {
+            var at_m = first;
+            if j > 0u { at_m = depths(ray, uv_m, j); }
+            ends = 0.5 * (at_m + depths(ray, uv_k, j));
+        }
         let bottom = select(min(deepest, max(top, ends[j & 3u])), deepest, j == count);
         let within = clamp(h - top, vec2f(0.0), vec2f(bottom - top));
         let sigma_t = strata[ray.stack.first + j].sigma_t;
@@ -247,6 +252,7 @@ fn scattered_between(ray: Ray, stratum: Stratum, start: f32, to: f32, near: vec3
     let middle = 0.5 * (start + to);
 #endif
     let uv_m = uv_at(ray, middle * ray.direction);
+    let first_depths = depths(ray, uv_m, 0u);
     let plane = plane_above(ray, middle);
     let heights = vec2f(plane_above(ray, start).w, plane_above(ray, to).w);
     let above = ray.origin + middle * ray.direction + plane.w * plane.xyz;
@@ -299,7 +305,7 @@ fn scattered_between(ray: Ray, stratum: Stratum, start: f32, to: f32, near: vec3
             let width = select(cos_in / cos_below, 1.0, ray.stack.bend == 1.0);
             let enters = width * (1.0 - fresnel_dielectric(min(1.0, cos_in), ray.eta));
             let uv_k = uv_at(ray, middle * ray.direction + (plane.w / cos_below) * to_light);
-            let down = optical_depths(ray, uv_m, uv_k, heights);
+            let down = optical_depths(ray, uv_m, first_depths, uv_k, heights);
             let first = near + down[0] / cos_below;
 #if UNIFORM
             let through = exp(-first);

@@ -5,6 +5,7 @@
 
 pub mod bvh;
 pub mod deform;
+pub mod depth_map;
 pub mod mesh;
 pub mod nearest;
 pub mod neighbours;

@@ -188,7 +188,13 @@ mod tests {
         let bumpy: Vec<Vec3> = mesh
             .positions
             .iter()
-            .map(|p| if top(p) { *p + 0.03 * Vec3::Z * (((p.x * 8.0).round() as i32 + (p.y * 8.0).round() as i32) % 2) as f32 } else { *p })
+            .map(|p| {
+                if top(p) {
+                    *p + 0.03 * Vec3::Z * (((p.x * 8.0).round() as i32 + (p.y * 8.0).round() as i32) % 2) as f32
+                } else {
+                    *p
+                }
+            })
             .collect();
         mesh.positions = bumpy;
         mesh.normals = mesh.smooth_normals();
@@ -232,7 +238,8 @@ mod tests {
             triangles: (0..7).map(|i| [i, i + 1, i + 2]).collect(),
             positions: line,
         };
-        let point = Mesh { positions: vec![Vec3::ONE; 5], normals: vec![Vec3::Y; 5], uvs: vec![], triangles: vec![[0, 1, 2]] };
+        let point =
+            Mesh { positions: vec![Vec3::ONE; 5], normals: vec![Vec3::Y; 5], uvs: vec![], triangles: vec![[0, 1, 2]] };
         let thin = shapes::slab(DVec3::new(1.0, 1.0, 1e-5), (6, 6));
         for (mesh, radius) in [(&needle, 3.0), (&point, 1.0), (&thin, 0.3), (&thin, f64::INFINITY), (&thin, 0.0)] {
             for (plane, normal) in planes(mesh, radius).iter().zip(&mesh.normals) {

@@ -144,7 +144,9 @@ fn parted(radiance: &[DVec3]) -> Parted {
         let (mean, matrix) = spread(&group);
         // The axis along which it is spread the most, by the power method from one that is none of the sky's own.
         let axis = (0..32).fold(DVec3::new(0.48, 0.6, 0.64), |axis, _| (matrix * axis).normalize_or(axis));
-        group.sort_by(|&a, &b| axis.dot(directions[a] - mean).total_cmp(&axis.dot(directions[b] - mean)).then(a.cmp(&b)));
+        group.sort_by(|&a, &b| {
+            axis.dot(directions[a] - mean).total_cmp(&axis.dot(directions[b] - mean)).then(a.cmp(&b))
+        });
         let half = 0.5 * light(&group);
         let mut passed = 0.0;
         let cut = group.iter().position(|&k| {
@@ -226,11 +228,13 @@ mod tests {
         for radiance in [vec![DVec3::ONE; DIRECTIONS], (0..DIRECTIONS).map(sun).collect::<Vec<_>>()] {
             let parted = parted(&radiance);
             assert_eq!(parted.lamps.len(), SKY_LAMPS);
-            let light = parted.lamps.iter().zip(&parted.sizes).map(|(l, n)| l.1.as_dvec3() * f64::from(*n)).sum::<DVec3>();
+            let light =
+                parted.lamps.iter().zip(&parted.sizes).map(|(l, n)| l.1.as_dvec3() * f64::from(*n)).sum::<DVec3>();
             assert!((light / radiance.iter().sum::<DVec3>() - 1.0).abs().max_element() < 1e-6);
             assert!(parted.sizes.iter().all(|n| *n > 0) && parted.sizes.iter().sum::<u32>() == DIRECTIONS as u32);
             // Each direction lies on its lamp's side of the sky.
-            let near = (0..DIRECTIONS).filter(|&k| parted.lamps[parted.lamp_of[k] as usize].0.as_dvec3().dot(all[k]) > 0.5);
+            let near =
+                (0..DIRECTIONS).filter(|&k| parted.lamps[parted.lamp_of[k] as usize].0.as_dvec3().dot(all[k]) > 0.5);
             assert!(near.count() > DIRECTIONS * 9 / 10);
         }
         let even = parted(&[DVec3::ONE; DIRECTIONS]);

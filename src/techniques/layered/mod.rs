@@ -135,7 +135,8 @@ fn neighbourhood(material: &Material, epsilon: f64) -> f64 {
 
 impl Technique for Layered {
     fn plan(&self, plan: &mut Plan, surface: &Surface) -> Result<Scattered, Problem> {
-        let mut stacks = vec![Stack { first: 0, last: 0, map: -1, deepest: 0.0, reach: 0.0, bend: 1.0 }; surface.places()];
+        let mut stacks =
+            vec![Stack { first: 0, last: 0, map: -1, deepest: 0.0, reach: 0.0, bend: 1.0 }; surface.places()];
         let mut strata = Vec::new();
         let mut maps = DepthMaps::default();
         for member in surface.members() {
@@ -194,7 +195,11 @@ impl Technique for Layered {
         }
         Ok(plan.add(Raster {
             name: "technique.layered",
-            about: format!("light that scattered once below {}, {} steps a ray", counted(draws.len(), "thing"), self.samples),
+            about: format!(
+                "light that scattered once below {}, {} steps a ray",
+                counted(draws.len(), "thing"),
+                self.samples
+            ),
             shader: surface.shader("techniques/layered.wgsl", &flags)?,
             size: surface.size(),
             targets: vec![(Format::Rgba32Float, Blend::Replace)],
