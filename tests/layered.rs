@@ -193,16 +193,17 @@ fn layers_that_are_none_change_nothing() {
         scattered(&mut studio, ball)
     };
     // One medium in any number of layers is that medium, but for where its steps end.
-    let (whole, bright) = (of(&[], SKIN), 0.02);
-    assert!(mean(&whole) > bright);
-    assert!(most_apart(&whole, &of(&[(SKIN, 0.3)], SKIN)) < 2e-3 * bright);
+    let whole = of(&[], SKIN);
+    let bright = mean(&whole);
+    assert!(bright > 1e-3);
+    assert!(most_apart(&whole, &of(&[(SKIN, 0.3)], SKIN)) < 0.01 * bright);
     assert!(
         most_apart(&whole, &of(&[(SKIN, 0.1), (SKIN, 0.2), (SKIN, 0.3), (SKIN, 0.5), (SKIN, 1.0)], SKIN))
-            < 2e-3 * bright
+            < 0.01 * bright
     );
     // Split in two.
     let two = of(&[(SKIN, 0.3), (FLESH, 0.8)], SKIN);
-    assert!(most_apart(&two, &of(&[(SKIN, 0.1), (SKIN, 0.3), (FLESH, 0.8)], SKIN)) < 2e-3 * bright);
+    assert!(most_apart(&two, &of(&[(SKIN, 0.1), (SKIN, 0.3), (FLESH, 0.8)], SKIN)) < 0.01 * bright);
     assert!(most_apart(&two, &whole) > 0.1 * bright);
     // What absorbs, and lies deeper under what does so too, is darker.
     let depths = [0.05, 0.1, 0.3, 1.0].map(|depth| mean(&of(&[(BLACK, depth)], SKIN)));
@@ -261,7 +262,8 @@ fn what_grazes_stays_a_number_and_near_its_limit() {
             let light = format!("Directional(direction: (-1, {:?}, 0), irradiance: 1, shadow: false)", -elevation);
             let image = scattered(&mut studio, &slab(ABOVE, &light, "Layered()"));
             let error = error(&image, ABOVE, |view| once(ior, bend, view, to_light, &layers, FLESH));
-            assert!(error < 0.02, "ior {ior}, sun at {elevation}: {error:.2e}");
+            // Normals are known to 3e-5.
+            assert!(error < 0.01 + 5e-5 / elevation, "ior {ior}, sun at {elevation}: {error:.2e}");
             // A low eye: the lower half of the picture sees the slab.
             let eye = dvec3(0.0, 4.0 * elevation, 4.0);
             let image = scattered(&mut studio, &slab(eye, SUN, "Layered()"));

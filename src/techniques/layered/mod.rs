@@ -10,7 +10,7 @@
 //!   integrated in closed form. `Uniform` is the paper's: equal steps, one value each, the layer of their beginning.
 //! - `samples: 12`: steps per ray. Uniform needs 50 to 100.
 //! - `refract: true`: rays are bent where they enter and leave. `false` leaves them straight, as the paper does.
-//! - `epsilon: 0.1`: how much light still counts when the plane is fitted.
+//! - `epsilon: 0.01`: how much light still counts where the plane is fitted.
 //!
 //! A layer that ends above the one outside it is not there: each ends at the deepest depth of all from the outside to it.
 //! That is decided in each texel, before maps are filtered, so that filtering invents no layer. `diaphane check` says where
@@ -74,7 +74,7 @@ pub enum March {
 
 impl Default for Layered {
     fn default() -> Layered {
-        Layered { samples: 12, march: March::Analytic, refract: true, epsilon: 0.1 }
+        Layered { samples: 12, march: March::Analytic, refract: true, epsilon: 0.01 }
     }
 }
 
