@@ -40,9 +40,11 @@ struct Stratum {
     parameter: vec3f,
 }
 
-// As in the frame's own passes.
-struct Direction {
+// A part of the sky.
+struct SkyLamp {
     direction: vec3f,
+    // How far it reaches to either side, as a cosine.
+    spread: f32,
     light: vec3f,
 }
 
@@ -56,7 +58,7 @@ struct Direction {
 @group(0) @binding(4) var visibility: texture_2d_array<f32>;
 #endif
 #if SKY_LAMPS
-@group(0) @binding(5) var<storage, read> sky_lamps: array<Direction>;
+@group(0) @binding(5) var<storage, read> sky_lamps: array<SkyLamp>;
 #endif
 @group(0) @binding(6) var<uniform> march: March;
 @group(0) @binding(7) var<storage, read> stacks: array<Stack>;
@@ -240,6 +242,17 @@ fn phase(stratum: Stratum, cos: f32) -> vec3f {
 }
 
 #if SKY_LAMPS
+// Where the light of a lamp comes from that lies above the horizon of a plane.
+fn above_horizon(lamp: SkyLamp, normal: vec3f) -> vec3f {
+    let cos = dot(lamp.direction, normal);
+    if abs(cos) >= lamp.spread {
+        return lamp.direction;
+    }
+    let middle = 0.5 * (cos + lamp.spread);
+    let sideways = lamp.direction - cos * normal;
+    return middle * normal + sqrt((1.0 - middle * middle) / max(1e-20, dot(sideways, sideways))) * sideways;
+}
+
 var<private> shares: array<vec4f, 4>;
 #endif
 
@@ -290,7 +303,7 @@ fn scattered_between(ray: Ray, stratum: Stratum, start: f32, to: f32, near: vec3
             if l >= lamps {
                 let lamp = sky_lamps[l - lamps];
                 let share = shares[(l - lamps) >> 2u][(l - lamps) & 3u];
-                light_in = Incident(lamp.direction, share * lamp.light, 1.0, 0.0);
+                light_in = Incident(above_horizon(lamp, plane.xyz), share * lamp.light, 1.0, 0.0);
             }
 #endif
             // Behind its plane a point is unlit.

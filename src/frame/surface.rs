@@ -112,8 +112,8 @@ impl<'a> Surface<'a> {
         upload::stream(plan, member.mesh, upload::Stream::Normals)
     }
 
-    /// The surroundings as 16 lamps far away, a list of `Direction`: where each is, and its irradiance on a plane that faces
-    /// it. None when there are no surroundings.
+    /// The surroundings as 16 lamps far away, a list of `SkyLamp`: where each is, how far it spreads, and its irradiance on a
+    /// plane that faces it. None when there are no surroundings.
     pub fn sky_lamps(&self, plan: &mut Plan) -> Option<Bind> {
         self.frame.sky_lamps(plan).map(Bind::Buffer)
     }

@@ -4,29 +4,43 @@
 //! the widest: a small bright window gets a lamp of its own, an even sky sixteen even ones. So the lamps are drawn by
 //! importance, and the same in every frame. How much of each reaches a vertex follows from the bits of where it sees out.
 
-use super::super::{Frame, Item, tables, upload};
+use super::super::{Frame, Item, upload};
 use super::light::DIRECTIONS;
 use crate::geometry::visibility::directions;
 use crate::gpu::{Bind, Buffer, Compute, Gpu};
 use crate::problem::Problem;
 use crate::store::{Bake, Plan, Run, Slot, Step};
 use crate::uniform;
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DMat4, DVec3, Mat4, Vec3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
+
+/// How far a lamp's light lies beside its middle, as a share of the sine of its cap's angle. Of a lamp that the horizon
+/// cuts, what is above counts as if it were where its own middle is. With 0.65 the light of an even sky that a half space
+/// scatters once is 1 ± 3 % too bright over all normals; without, 7 ± 6 % are missing.
+const SPREAD: f64 = 0.65;
 
 /// A multiple of four: shares travel in vectors.
 pub const SKY_LAMPS: usize = 16;
 
 uniform! {
     struct Quad {
+        world_from_object: Mat4,
         first: u32,
     }
 }
 
+uniform! {
+    struct SkyLamp {
+        direction: Vec3,
+        spread: f32,
+        light: Vec3,
+    }
+}
+
 impl Frame<'_> {
-    /// The lamps that stand for the surroundings, 16 of `Direction`: where they are in the world, and their irradiance on a
-    /// plane that faces them. None when there are no surroundings.
+    /// The lamps that stand for the surroundings, 16 of `SkyLamp`: where they are in the world, how far they spread, and
+    /// their irradiance on a plane that faces them. None when there are no surroundings.
     pub(in crate::frame) fn sky_lamps(&self, plan: &mut Plan) -> Option<Slot<Buffer>> {
         let surroundings = self.surroundings(plan)?;
         let parted = self.sky_parted(plan)?;
@@ -51,7 +65,10 @@ impl Frame<'_> {
             flags.push("OCCLUDED");
             binds.push(("visible", Bind::Buffer(visible)));
         }
-        let over = upload::stream(plan, item.mesh, upload::Stream::Positions);
+        let over = upload::stream(plan, item.mesh, upload::Stream::Normals);
+        binds.push(("normals", Bind::Buffer(over)));
+        let rotation = DAffine3 { translation: DVec3::ZERO, ..item.world_from_object };
+        let world_from_object = DMat4::from(rotation).as_mat4();
         let share = |quad: usize| -> Result<Slot<Buffer>, Problem> {
             let first = 4 * quad as u32;
             Ok(plan.add(Compute {
@@ -61,7 +78,7 @@ impl Frame<'_> {
                 output: ("share", 16),
                 over,
                 over_stride: 12,
-                binds: [vec![("quad", Bind::uniform(&Quad { first }))], binds.clone()].concat(),
+                binds: [vec![("quad", Bind::uniform(&Quad { world_from_object, first }))], binds.clone()].concat(),
             }))
         };
         (0..SKY_LAMPS / 4).map(share).collect()
@@ -189,9 +206,12 @@ impl Step for UploadLamps {
         let solid_angle = 4.0 * PI / DIRECTIONS as f64;
         let row = |(&(direction, level), &size): (&(Vec3, Vec3), &u32)| {
             let light = f64::from(size) * solid_angle * level.as_dvec3() * self.radiance;
-            tables::Direction { direction, light: light.as_vec3() }
+            // A cap of that solid angle.
+            let cos = 1.0 - 0.5 * f64::from(size) * solid_angle / PI;
+            let spread = SPREAD * (1.0 - cos * cos).max(0.0).sqrt();
+            SkyLamp { direction, spread: spread as f32, light: light.as_vec3() }
         };
-        let table: Vec<tables::Direction> = parted.lamps.iter().zip(&parted.sizes).map(row).collect();
+        let table: Vec<SkyLamp> = parted.lamps.iter().zip(&parted.sizes).map(row).collect();
         let mut bytes = encase::StorageBuffer::new(Vec::new());
         bytes.write(&table).expect("a vector can grow");
         Ok(Buffer::new(run.host::<Gpu>(), &bytes.into_inner()))
