@@ -8,6 +8,7 @@ mod attenuation;
 mod depth_map_thickness;
 mod filtered_normals;
 mod kernel;
+mod layered;
 mod local;
 mod long_range;
 mod opaque;
@@ -74,6 +75,15 @@ pub const REGISTRY: &[Entry] = &[
     entry!(opaque, Opaque),
     entry!(filtered_normals, FilteredNormals, "FilteredNormals(engine: Harmonics)"),
     entry!(
+        layered,
+        Layered,
+        "Layered(samples: 4)",
+        "Layered(samples: 10, march: Uniform)",
+        "Layered(samples: 50, march: Uniform)",
+        "Layered(samples: 100, march: Uniform)",
+        "Layered(refract: false)"
+    ),
+    entry!(
         long_range,
         LongRange,
         "LongRange(layers: 6)",
@@ -123,13 +133,12 @@ pub const REGISTRY: &[Entry] = &[
 ];
 
 /// Techniques that a scene may name one day.
-const LATER: [&str; 7] = [
+const LATER: [&str; 6] = [
     "PrecomputedTransfer",
     "DeepScreenSpace",
     "MultiresolutionSplatting",
     "SeparableScreenSpace",
     "AdjacencyMaps",
-    "Layered",
     "Auto",
 ];
 
