@@ -36,6 +36,14 @@ pub(super) struct LightViews {
     pub size: u32,
 }
 
+/// How to look up the shadows of one lamp.
+pub(super) struct Shadow {
+    /// Its place in the table of lamps.
+    pub lamp: usize,
+    /// Bindings of `frame/shadows.wgsl`.
+    pub binds: Vec<(&'static str, Bind)>,
+}
+
 impl Frame<'_> {
     /// The lights that shine on surfaces from a place or direction, with their places in the scene.
     pub(super) fn lamps(&self) -> Vec<(usize, &Light)> {
@@ -78,26 +86,24 @@ impl Frame<'_> {
         row_in(light, visibility, &DAffine3::from_translation(-self.view.camera.eye))
     }
 
-    /// How much of each lamp that casts shadows every pixel sees: an array of layers. None when no lamp does.
-    pub(crate) fn visibility(&self, plan: &mut Plan, gbuffer: Slot<Images>) -> Result<Option<Slot<Images>>, Problem> {
-        if let Some(planned) = self.visibility.get() {
-            return Ok(*planned);
+    /// The shadows of the lamps that cast any.
+    pub(super) fn shadows(&self, plan: &mut Plan) -> Result<&[Shadow], Problem> {
+        if let Some(planned) = self.shadows.get() {
+            return Ok(planned);
         }
-        let planned = self.plan_visibility(plan, gbuffer)?;
-        Ok(*self.visibility.get_or_init(|| planned))
+        let planned = self.plan_shadows(plan)?;
+        Ok(self.shadows.get_or_init(|| planned))
     }
 
-    fn plan_visibility(&self, plan: &mut Plan, gbuffer: Slot<Images>) -> Result<Option<Slot<Images>>, Problem> {
-        let lamps = self.lamps();
-        let Some(lights) = self.lights_bind() else { return Ok(None) };
-        let mut layers = Vec::new();
-        for (place, (i, light)) in lamps.iter().enumerate() {
+    fn plan_shadows(&self, plan: &mut Plan) -> Result<Vec<Shadow>, Problem> {
+        let mut shadows = Vec::new();
+        for (lamp, (i, light)) in self.lamps().into_iter().enumerate() {
             if !Self::casts(light) {
                 plan.skip(format!("shadows of the light `{}`", light.name), "shadow: false");
                 continue;
             }
             let views = self.views(light);
-            let shadow_map = self.shadow_map(plan, *i, light, &views, None)?;
+            let shadow_map = self.shadow_map(plan, i, light, &views, None)?;
             let eye = DMat4::from_translation(self.view.camera.eye);
             let table: Vec<tables::ShadowView> = views
                 .views
@@ -108,34 +114,37 @@ impl Frame<'_> {
                     is_directional: matches!(light.kind, LightKind::Directional { .. }) as u32,
                 })
                 .collect();
-            let which = tables::Views { light: place as u32, per_sample: views.per_sample };
-            layers.push(Layer {
-                binds: vec![
-                    ("views", Bind::uniform(&which)),
-                    ("shadow_views", Bind::list(&table)),
-                    ("shadow_map", Bind::Texture(shadow_map, 0)),
-                ],
-                cover: Cover::Pixels,
-            });
+            let which = tables::Views { light: lamp as u32, per_sample: views.per_sample };
+            let binds = vec![
+                ("views", Bind::uniform(&which)),
+                ("shadow_views", Bind::list(&table)),
+                ("shadow_map", Bind::Texture(shadow_map, 0)),
+                ("compare", Bind::Sampler(Sampler::Shadow)),
+            ];
+            shadows.push(Shadow { lamp, binds });
         }
-        if layers.is_empty() {
-            return Ok(None);
-        }
+        Ok(shadows)
+    }
+
+    /// How much of each lamp that casts shadows every pixel sees: an array of layers. None when no lamp does.
+    pub(crate) fn visibility(&self, plan: &mut Plan, gbuffer: Slot<Images>) -> Result<Option<Slot<Images>>, Problem> {
+        let shadows = self.shadows(plan)?;
+        let Some(lights) = self.lights_bind().filter(|_| !shadows.is_empty()) else { return Ok(None) };
+        let layer = |shadow: &Shadow| Layer { binds: shadow.binds.clone(), cover: Cover::Pixels };
         Ok(Some(plan.add(Raster {
             name: "frame.visibility",
-            about: format!("how much of {} each pixel sees", counted(layers.len(), "light")),
+            about: format!("how much of {} each pixel sees", counted(shadows.len(), "light")),
             shader: self.shaders.load("frame/visibility.wgsl", &[])?,
             size: self.view.sampled_size(),
             targets: vec![(Format::R16Float, crate::gpu::Blend::Replace)],
             depth: Depth::Off,
-            layers,
+            layers: shadows.iter().map(layer).collect(),
             array: true,
             binds: vec![
                 ("objects", self.objects_bind()),
                 ("position_map", Bind::Texture(gbuffer, POSITION)),
                 ("packed_map", Bind::Texture(gbuffer, PACKED)),
                 ("lights", lights),
-                ("compare", Bind::Sampler(Sampler::Shadow)),
             ],
         })))
     }

@@ -14,6 +14,7 @@
 
 mod compose;
 mod gloss;
+mod irradiance;
 mod lamp;
 mod lights;
 mod sky;
@@ -95,8 +96,8 @@ pub struct Frame<'a> {
     pub(crate) items: Vec<Item>,
     clip_from_eye: DMat4,
     camera: tables::Camera,
-    /// The visibility of the lamps, once it was asked for: many views are costly to plan again.
-    visibility: OnceCell<Option<Slot<Images>>>,
+    /// The shadows of the lamps, once they were asked for: many views are costly to plan again.
+    shadows: OnceCell<Vec<lights::Shadow>>,
     /// The table of everything that is drawn, once it was asked for: nearly every pass binds it.
     objects: OnceCell<Bind>,
 }
@@ -149,7 +150,7 @@ impl<'a> Frame<'a> {
             items,
             clip_from_eye: DMat4::IDENTITY,
             camera: Frame::camera(view),
-            visibility: OnceCell::new(),
+            shadows: OnceCell::new(),
             objects: OnceCell::new(),
         };
         frame.clip_from_eye = frame.projection() * frame.rotation();

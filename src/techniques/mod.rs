@@ -7,9 +7,14 @@
 mod attenuation;
 mod depth_map_thickness;
 mod filtered_normals;
+mod kernel;
+mod layered;
 mod local;
+mod long_range;
 mod opaque;
 pub mod reference;
+mod screen;
+mod screen_space;
 mod spherical_thickness;
 
 use crate::frame::Surface;
@@ -68,7 +73,25 @@ macro_rules! entry {
 /// Every technique there is.
 pub const REGISTRY: &[Entry] = &[
     entry!(opaque, Opaque),
-    entry!(filtered_normals, FilteredNormals),
+    entry!(filtered_normals, FilteredNormals, "FilteredNormals(engine: Harmonics)"),
+    entry!(
+        layered,
+        Layered,
+        "Layered(samples: 4)",
+        "Layered(samples: 10, march: Uniform)",
+        "Layered(samples: 50, march: Uniform)",
+        "Layered(samples: 100, march: Uniform)",
+        "Layered(refract: false)"
+    ),
+    entry!(
+        long_range,
+        LongRange,
+        "LongRange(layers: 6)",
+        "LongRange(splats: 500)",
+        "LongRange(splats: 8000)",
+        "LongRange(brighten: Paper)"
+    ),
+    entry!(screen_space, ScreenSpace, "ScreenSpace(layers: 6)", "ScreenSpace(n_l: 8)", "ScreenSpace(brighten: Paper)"),
     Entry {
         name: "SphericalThickness",
         manual: include_str!("spherical_thickness/mod.rs"),
@@ -110,15 +133,12 @@ pub const REGISTRY: &[Entry] = &[
 ];
 
 /// Techniques that a scene may name one day.
-const LATER: [&str; 9] = [
+const LATER: [&str; 6] = [
     "PrecomputedTransfer",
-    "LongRange",
-    "ScreenSpace",
     "DeepScreenSpace",
     "MultiresolutionSplatting",
     "SeparableScreenSpace",
     "AdjacencyMaps",
-    "Layered",
     "Auto",
 ];
 
