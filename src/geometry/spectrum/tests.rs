@@ -156,7 +156,9 @@ fn size_orientation_and_order_of_a_mesh_change_nothing() {
     }
     let n = mesh.positions.len() as u32;
     // No divisor in common: a permutation.
-    let step = (7..).find(|step| (2..=*step).all(|d| step % d != 0 || n % d != 0)).expect("there is one");
+    let step = (7u32..)
+        .find(|step| (2..=*step).all(|d| !step.is_multiple_of(d) || !n.is_multiple_of(d)))
+        .expect("there is one");
     let to = |v: u32| (step * v + 3) % n;
     let mut shuffled = Mesh { uvs: vec![], ..mesh.clone() };
     for v in 0..n {
