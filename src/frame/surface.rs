@@ -5,9 +5,8 @@ use crate::geometry::mesh::Mesh;
 use crate::gpu::{Bind, Buffer, Draw, Format, Gpu, Images, Shader, Shape};
 use crate::image::Texture;
 use crate::problem::{Problem, counted};
-use crate::scene::{AsNumber, Material, TextureMap, Varying};
+use crate::scene::{AsNumber, Material, Object, TextureMap, Varying, shape};
 use crate::store::{Key, Plan, Run, Slot, Step};
-use glam::Vec3;
 use half::f16;
 use serde::Serialize;
 
@@ -27,6 +26,13 @@ pub struct Member<'a> {
     pub material: &'a Material,
     /// Object space, scaled: scene units.
     pub mesh: Slot<Mesh>,
+}
+
+impl Member<'_> {
+    /// Its place in the table of [`Surface::objects`].
+    pub fn place(&self) -> usize {
+        self.place
+    }
 }
 
 impl<'a> Surface<'a> {
@@ -50,6 +56,11 @@ impl<'a> Surface<'a> {
     /// The longest side of a member's box, as its object wears it: scene units.
     pub fn extent(&self, member: &Member) -> f64 {
         self.frame.object(self.item(member)).map_or(0.0, super::extent)
+    }
+
+    /// The diagonal of that box, scene units.
+    pub fn diagonal(&self, member: &Member) -> f64 {
+        self.frame.object(self.item(member)).map_or(0.0, super::diagonal)
     }
 
     pub fn shader(&self, name: &str, flags: &[&str]) -> Result<Shader, Problem> {
@@ -108,14 +119,68 @@ impl<'a> Surface<'a> {
         self.frame.irradiance(plan, member.place, points)
     }
 
+    /// The mesh's positions, as a vertex stream.
+    pub fn positions(&self, plan: &mut Plan, member: &Member) -> Slot<Buffer> {
+        upload::stream(plan, member.mesh, upload::Stream::Positions)
+    }
+
+    /// Whether steps that can hardly change the picture are left out.
+    pub fn skips(&self) -> bool {
+        self.frame.view.skip
+    }
+
     /// The mesh's own normals, as a vertex stream.
     pub fn normals(&self, plan: &mut Plan, member: &Member) -> Slot<Buffer> {
         upload::stream(plan, member.mesh, upload::Stream::Normals)
     }
 
+    /// The surroundings as 16 lamps far away, a list of `SkyLamp`: where each is, how far it spreads, and its irradiance on a
+    /// plane that faces it. None when there are no surroundings.
+    pub fn sky_lamps(&self, plan: &mut Plan) -> Option<Bind> {
+        self.frame.sky_lamps(plan).map(Bind::Buffer)
+    }
+
+    /// Which share of each of these lamps reaches each vertex of a member: four vertex streams of `vec4f`.
+    pub fn sky_shares(&self, plan: &mut Plan, member: &Member) -> Result<Vec<Slot<Buffer>>, Problem> {
+        self.frame.sky_shares(plan, self.item(member))
+    }
+
+    /// How many things the table of [`Surface::objects`] has.
+    pub fn places(&self) -> usize {
+        self.frame.items.len()
+    }
+
     /// A vector per vertex, as a vertex stream.
-    pub fn upload(&self, plan: &mut Plan, vectors: Slot<Vec<Vec3>>) -> Slot<Buffer> {
+    pub fn upload<T: bytemuck::Pod + Send + Sync>(&self, plan: &mut Plan, vectors: Slot<Vec<T>>) -> Slot<Buffer> {
         upload::list(plan, vectors, "a vector per vertex")
+    }
+
+    /// A member's place in the table of objects.
+    pub fn place(&self, member: &Member) -> u32 {
+        member.place as u32
+    }
+
+    /// A list, on the device as it is.
+    pub fn upload_list<T>(&self, plan: &mut Plan, values: Slot<Vec<T>>, about: &'static str) -> Slot<Buffer>
+    where
+        T: bytemuck::Pod + Send + Sync,
+    {
+        upload::list(plan, values, about)
+    }
+
+    /// The positions of a mesh's vertices, then their normals, as vertex streams.
+    pub fn points(&self, plan: &mut Plan, mesh: Slot<Mesh>) -> [Slot<Buffer>; 2] {
+        [upload::Stream::Positions, upload::Stream::Normals].map(|stream| upload::stream(plan, mesh, stream))
+    }
+
+    /// A member's mesh before it was deformed, vertex by vertex and triangle by triangle the same: what is baked from it
+    /// holds at all times.
+    pub fn rest(&self, plan: &mut Plan, member: &Member) -> Slot<Mesh> {
+        let object = self.frame.object(self.item(member)).expect("a member is an object");
+        match object.deform.is_empty() {
+            true => member.mesh,
+            false => shape::mesh(plan, &Object { deform: Vec::new(), ..object.clone() }, 0.0),
+        }
     }
 
     /// The member, to be drawn with the given streams after its positions.
@@ -129,7 +194,12 @@ impl<'a> Surface<'a> {
         }
     }
 
-    fn item(&self, member: &Member) -> &'a Item {
+    /// Several pictures of which each is 0 where the others' objects are.
+    pub fn merge(&self, plan: &mut Plan, pictures: &[Slot<Images>]) -> Result<Option<Slot<Images>>, Problem> {
+        self.frame.merge(plan, pictures)
+    }
+
+    pub(super) fn item(&self, member: &Member) -> &'a Item {
         &self.frame.items[member.place]
     }
 }

@@ -61,6 +61,13 @@ uniform! {
 }
 
 uniform! {
+    pub struct OthersView {
+        pub clip_from_object: Mat4,
+        pub per_sample: u32,
+    }
+}
+
+uniform! {
     pub struct Views {
         pub light: u32,
         pub per_sample: u32,
@@ -150,7 +157,8 @@ mod tests {
             ($($name:ident),*) => { vec![$(of::<$name>(stringify!($name))),*] };
         }
         let ours = layouts![
-            Camera, Object, Light, Caster, ShadowView, Views, Points, Vertices, Direction, Sky, Resolve, Display
+            Camera, Object, Light, Caster, ShadowView, OthersView, Views, Points, Vertices, Direction, Sky, Resolve,
+            Display
         ];
         let declared = include_str!("tables.rs").matches("uniform! {").count() - 1; // this line is one more
         assert_eq!(ours.len(), declared, "a struct is missing in the list above");

@@ -5,6 +5,8 @@
 //! normal a technique hands over, so that editing the sky, the material or the normals casts no ray. What deforms sees the
 //! whole sky and hides none of it: `explain` says so.
 
+mod harmonics;
+mod lamps;
 mod light;
 mod mirror;
 
@@ -109,8 +111,13 @@ impl Frame<'_> {
     }
 
     fn sky_light(&self, plan: &mut Plan, surroundings: &Surroundings) -> Slot<Buffer> {
-        let cells = surroundings.image.map(|image| plan.bake(SkyCells { image, rotation: surroundings.rotation }));
+        let cells = self.sky_cells(plan, surroundings);
         plan.add(SkyLight { radiance: surroundings.radiance, cells })
+    }
+
+    /// The mean radiance of an image around each direction; none where the sky is even.
+    fn sky_cells(&self, plan: &mut Plan, surroundings: &Surroundings) -> Option<Slot<Vec<Vec3>>> {
+        surroundings.image.map(|image| plan.bake(SkyCells { image, rotation: surroundings.rotation }))
     }
 
     /// The irradiance that enters at each vertex of `points` from the surroundings, for a normal each; 16 bytes a vertex.
