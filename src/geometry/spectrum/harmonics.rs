@@ -23,7 +23,7 @@ const SMALL: usize = 700;
 /// Pairs that a band is meant to have, and columns of a block: an eigenvalue repeated more often is found all the same,
 /// with more steps.
 const BAND: f64 = 80.0;
-const BLOCK: usize = 8;
+const BLOCK: usize = 4;
 
 /// Eigenvalues nearer to each other than this, relative to themselves, count as one repeated.
 const REPEATED: f64 = 1e-5;
@@ -153,7 +153,8 @@ impl Slicer<'_> {
         let (shift, _) = self.end_of_band(0.5 * (from + to))?;
         let factor = self.factor(shift)?;
         let known_count = known.len() / n;
-        let most = (3 * count + 12 * BLOCK).min(n - self.laplacian.components());
+        // The pairs at a band's ends are hard to tell from those beyond: some fifty steps, whatever their number.
+        let most = (4 * count + 48 * BLOCK).min(n - self.laplacian.components());
         let mut space = Space::new(self.laplacian, known_count + most);
         let scaled = Mat::from_fn(n, known_count, |i, k| known[k * n + i] * self.laplacian.areas[i].sqrt());
         space.extend(scaled, Some(1.0));
