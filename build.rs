@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// A new version of one of these may change the last bits of a bake.
-const NUMERICAL_CRATES: [&str; 5] = ["gauss-quad", "glam", "half", "obvhs", "tobj"];
+const NUMERICAL_CRATES: [&str; 7] = ["faer", "gauss-quad", "glam", "half", "obvhs", "sprs", "tobj"];
 
 fn files_below(folder: &Path, extension: &str, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).expect("a source folder can be listed") {

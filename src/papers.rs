@@ -34,12 +34,29 @@ pub const PAPERS: &[Paper] = &[
         "Doi1991",
         "A. Doi & A. Koide. An Efficient Method of Triangulating Equi-Valued Surfaces by Using Tetrahedral Cells. IEICE E74, 1991",
     ),
+    paper(
+        "Donner2005",
+        "C. Donner & H. W. Jensen. Light Diffusion in Multi-Layered Translucent Materials. SIGGRAPH 2005",
+    ),
     paper("Dupuy2023", "J. Dupuy & A. Benyoub. Sampling Visible GGX Normals with Spherical Caps. CGF 42(8), 2023"),
+    paper(
+        "Edelsbrunner1990",
+        "H. Edelsbrunner & E. Mücke. Simulation of Simplicity: A Technique to Cope with Degenerate Cases. ACM TOG 9(1), 1990",
+    ),
+    paper(
+        "Felzenszwalb2012",
+        "P. Felzenszwalb & D. Huttenlocher. Distance Transforms of Sampled Functions. Theory of Computing 8(19), 2012",
+    ),
     paper(
         "Francois2006",
         "G. François, S. Pattanaik, K. Bouatouch & G. Breton. Subsurface Texture Mapping. IRISA PI 1806, 2006",
     ),
     paper("Green2004", "S. Green. Real-Time Approximations to Subsurface Scattering. GPU Gems 1, chapter 16, 2004"),
+    paper(
+        "Grimes1994",
+        "R. Grimes, J. Lewis & H. Simon. A Shifted Block Lanczos Algorithm for Solving Sparse Symmetric Generalized Eigenproblems. SIAM J. Matrix Anal. Appl. 15(1), 1994",
+    ),
+    paper("Guettel2013", "S. Güttel. Rational Krylov Approximation of Matrix Functions. GAMM-Mitteilungen 36(1), 2013"),
     paper(
         "Habel2013",
         "R. Habel, P. Christensen & W. Jarosz. Photon Beam Diffusion: A Hybrid Monte Carlo Method for Subsurface Scattering. CGF 32(4), 2013",
@@ -78,6 +95,7 @@ pub const PAPERS: &[Paper] = &[
         "Ramamoorthi2001",
         "R. Ramamoorthi & P. Hanrahan. An Efficient Representation for Irradiance Environment Maps. SIGGRAPH 2001",
     ),
+    paper("Sharp2020", "N. Sharp & K. Crane. A Laplacian for Nonmanifold Triangle Meshes. CGF 39(5), 2020"),
     paper(
         "Takahasi1974",
         "H. Takahasi & M. Mori. Double Exponential Formulas for Numerical Integration. Publ. RIMS 9(3), 1974",
@@ -90,6 +108,7 @@ pub const PAPERS: &[Paper] = &[
         "Tomaszewska2012",
         "A. Tomaszewska & K. Stefanowski. Real-Time Spherical Harmonics Based Subsurface Scattering. ICIAR 2012",
     ),
+    paper("Vallet2008", "B. Vallet & B. Lévy. Spectral Geometry Processing with Manifold Harmonics. CGF 27(2), 2008"),
     paper("Walter2007", "B. Walter et al. Microfacet Models for Refraction through Rough Surfaces. EGSR 2007"),
     paper(
         "Walter2009",

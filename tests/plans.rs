@@ -86,13 +86,61 @@ fn filtered_normals_take_the_steps_of_opaque_but_for_the_bake() {
         plan.steps().iter().map(|step| step.name).collect::<Vec<_>>()
     };
     let (filtered, opaque) = (names("FilteredNormals()"), names("Opaque()"));
-    let drawn = |names: &[&'static str]| {
-        names.iter().copied().filter(|name| *name != NORMALS && *name != "gpu.upload").collect::<Vec<_>>()
-    };
+    let is_prepared = |name: &str| name.starts_with("filtered_normals.") || name == "gpu.upload";
+    let drawn = |names: &[&'static str]| names.iter().copied().filter(|name| !is_prepared(name)).collect::<Vec<_>>();
     assert_eq!(drawn(&filtered), drawn(&opaque));
-    // The bake, and its normals on the device beside the mesh's own.
-    assert_eq!(filtered.len(), opaque.len() + 2);
-    assert!(filtered.contains(&NORMALS) && !opaque.contains(&NORMALS));
+    let count = |name| filtered.iter().filter(|step| **step == name).count();
+    // The bake, its two uploads; then two of the channels absorb alike, and have one normal.
+    assert_eq!(filtered.len(), opaque.len() + 1 + 2 + 2 * 2);
+    assert_eq!((count(KRYLOV), count("filtered_normals.reconstruct")), (1, 2));
+    assert!(!opaque.contains(&KRYLOV));
+}
+
+/// An edit of a kernel, and whether it needs another basis.
+#[test]
+fn an_edit_of_a_kernel_runs_one_pass_over_the_vertices_and_no_bake() {
+    let neighbours = "Neighbours(sigma_tr: 0.5, radius: 4, alpha: 0.3, weights: Area, length: Keep)";
+    assert!(BALL.contains(neighbours));
+    let plan = |filter: &str| Desk::new(&BALL.replace(neighbours, filter)).plan(&[]);
+    let passes = BTreeMap::from(
+        ["filtered_normals.kernel", "filtered_normals.reconstruct", "frame.environment", "technique.local"]
+            .map(|name| (name, 1)),
+    );
+    let look: Vec<&str> = vec![
+        "frame.compose",
+        "frame.gbuffer",
+        "frame.gloss",
+        "frame.image",
+        "frame.merge",
+        "frame.through",
+        "frame.visibility",
+    ];
+    for (before, after, is_new) in [
+        ("Gaussian(width: 2)", "Gaussian(width: 1.5)", None),
+        ("Gaussian(width: 2)", "Exponential(width: 2.4)", None),
+        ("Exponential(width: 2)", "Curve(points: [(0, 1), (0.9, 0)])", None),
+        ("Normalized(std: 0.3)", "Normalized(std: 0.2)", None),
+        ("Box(wavelength: 4)", "Box(wavelength: 5)", None),
+        ("Gaussian(width: 2)", "Gaussian(width: 0.1)", Some(KRYLOV)),
+        ("Gaussian(width: 2)", "Box(wavelength: 4)", Some("filtered_normals.harmonics")),
+        ("Box(wavelength: 4)", "Box(wavelength: 0.4)", Some("filtered_normals.harmonics")),
+    ] {
+        let mut made = made_anew(&plan(before), &plan(after));
+        made.retain(|name, _| !look.contains(name));
+        match is_new {
+            None => assert_eq!(made, passes, "{before} -> {after}"),
+            Some(bake) => {
+                assert_eq!((made.remove(bake), made.remove("gpu.upload")), (Some(1), Some(2)), "{before} -> {after}");
+                assert_eq!(made, passes, "{before} -> {after}");
+            }
+        }
+    }
+    // One channel's width: its normal alone, and what the surroundings send to it.
+    let [all, red] = ["(2, 2.1, 2.2)", "(1.9, 2.1, 2.2)"].map(|width| plan(&format!("Gaussian(width: {width})")));
+    let mut made = made_anew(&all, &red);
+    made.retain(|name, _| !look.contains(name));
+    assert_eq!(made, passes);
+    assert_eq!(all.steps().iter().filter(|step| step.name == "frame.environment").count(), 4, "three, and the floor's");
 }
 
 /// A scene with one of everything, and its material, both to be edited.
@@ -256,6 +304,7 @@ fn an_edit_makes_anew_what_the_table_says() {
 const SHADOW: &str = "frame.shadow";
 const SKY: &str = "sky.visibility";
 const NORMALS: &str = "filtered_normals.neighbours";
+const KRYLOV: &str = "filtered_normals.krylov";
 const SHAPE: &str = "geometry.shape";
 
 #[test]
@@ -292,7 +341,7 @@ fn edits_make_nothing_that_does_not_depend_on_them() {
             assert!(!made.contains_key(name), "{then} makes {name} anew");
         }
     }
-    for (says, then) in &MATERIAL_EDITS[8..14] {
+    for (says, then) in &MATERIAL_EDITS[8..13] {
         let made = after_material(says, then);
         assert_eq!(made.get(NORMALS), Some(&1), "{then}");
         spares(made, &[SHADOW, SKY, SHAPE], then);
@@ -329,4 +378,62 @@ fn undoing_an_edit_finds_all_that_was_there() {
         assert_eq!(desk.plan(&[]).keys().collect::<Vec<_>>(), before, "{path}");
     }
     assert_eq!(Desk::new(BALL).plan(&[]).keys().collect::<Vec<_>>(), before, "another folder with the same content");
+}
+
+/// A plan of the ball with another technique, after edits of the scene and of its material.
+fn with_technique(technique: &str, sets: &[(&str, &str)], ball: &str) -> Plan {
+    let all: Vec<(&str, &str)> = [("view.technique", technique)].into_iter().chain(sets.iter().copied()).collect();
+    Desk::new(ball).plan(&all)
+}
+
+#[test]
+fn thickness_is_baked_of_shapes_and_what_it_leaves_of_light_of_media() {
+    const LENGTHS: &str = "thickness.lengths";
+    const LEFT: &str = "thickness.transmittance";
+    let is_bake = |name: &&str| name.starts_with("thickness.");
+    for technique in ["SphericalThickness()", "SphericalThickness(encode: Thickness, attenuation: Beer)"] {
+        let before = with_technique(technique, &[], BALL);
+        let baked = |sets: &[(&str, &str)], ball: &str| {
+            let made = made_anew(&before, &with_technique(technique, sets, ball));
+            assert!(made.contains_key("frame.image"), "{technique} {sets:?}");
+            made.into_keys().filter(is_bake).collect::<Vec<_>>()
+        };
+        assert!(before.steps().iter().any(|step| step.name == LENGTHS && step.is_bake()));
+        for (path, ron) in [
+            ("lights.sun.irradiance", "3"),
+            ("lights.sun.direction", "(0, -1, 1)"),
+            ("lights.lamp.position", "(3, 4, -3)"),
+            ("lights.room.radiance", "3"),
+            ("lights.room.rotation_deg", "10"),
+            ("camera.eye", "(0.1, 2, 8)"),
+            ("objects.ball.transform.translate", "(0.2, 1, 0)"),
+            ("objects.ball.transform.rotate_deg", "(10, 20, 30)"),
+        ] {
+            assert_eq!(baked(&[(path, ron)], BALL), Vec::<&str>::new(), "{technique}: {path}");
+        }
+        let edit = |says: &str, then: &str| {
+            assert!(BALL.contains(says));
+            baked(&[], &BALL.replace(says, then))
+        };
+        assert_eq!(edit("color: (1, 1, 1)", "color: (1, 1, 0.9)"), Vec::<&str>::new());
+        assert_eq!(edit("roughness: 0.3", "roughness: 0.4"), Vec::<&str>::new());
+        assert_eq!(edit("sigma_a: (0.02, 0.03, 0.05)", "sigma_a: (0.02, 0.03, 0.06)"), [LEFT]);
+        let shape = baked(&[("objects.ball.transform.scale", "1.1")], BALL);
+        assert!(shape.contains(&LENGTHS) && shape.contains(&LEFT), "{shape:?}");
+    }
+    // What the response does not read is not in its name.
+    let linear = "SphericalThickness(attenuation: Linear, max_thickness: 9)";
+    let denser = BALL.replace("sigma_a: (0.02, 0.03, 0.05)", "sigma_a: (0.02, 0.03, 0.06)");
+    let made = made_anew(&with_technique(linear, &[], BALL), &with_technique(linear, &[], &denser));
+    assert!(!made.keys().any(|name| is_bake(name)), "{made:?}");
+}
+
+#[test]
+fn lamps_in_front_of_a_thing_ask_for_fewer_coefficients() {
+    let said = |direction: &str| {
+        let plan = with_technique("SphericalThickness()", &[("lights.sun.direction", direction)], BALL);
+        let found = plan.steps().iter().find(|step| step.name.ends_with(".through") && step.about.contains("`sun`"));
+        found.expect("the sun sends light through the ball").about.clone()
+    };
+    assert!(said("(0, -0.2, -1)").ends_with("4 coefficients") && said("(0, -0.2, 1)").ends_with("25 coefficients"));
 }

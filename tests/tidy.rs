@@ -316,7 +316,7 @@ fn the_project_speaks_of_itself_alone() {
     let mut wrong = Vec::new();
     let folders = ["src", "shaders", "tests", "benches", "scenes", "materials", "tools", "docs", ".ci"];
     let mut files = texts(&folders, &[".rs", ".wgsl", ".ron", ".md", ".txt", ".toml", ".yml", ".sh"]);
-    files.extend(texts(&["tools", ".ci"], &["start", "test", "setup", "stress", "fetch-models"]));
+    files.extend(texts(&["tools", ".ci"], &["start", "test", "setup", "stress", "fuzz", "fetch-models"]));
     for path in
         ["README.md", "Cargo.toml", "build.rs", ".gitignore"].into_iter().filter(|path| Path::new(path).exists())
     {

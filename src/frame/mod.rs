@@ -14,6 +14,8 @@
 
 mod compose;
 mod gloss;
+mod irradiance;
+mod lamp;
 mod lights;
 mod sky;
 mod surface;
@@ -22,6 +24,7 @@ mod upload;
 
 pub use crate::scene::Part;
 pub(crate) use compose::{display, read_back};
+pub use lamp::{Lamp, LampViews};
 pub use surface::{Member, Surface};
 
 use crate::geometry::mesh::Mesh;
@@ -93,8 +96,8 @@ pub struct Frame<'a> {
     pub(crate) items: Vec<Item>,
     clip_from_eye: DMat4,
     camera: tables::Camera,
-    /// The visibility of the lamps, once it was asked for: many views are costly to plan again.
-    visibility: OnceCell<Option<Slot<Images>>>,
+    /// The shadows of the lamps, once they were asked for: many views are costly to plan again.
+    shadows: OnceCell<Vec<lights::Shadow>>,
     /// The table of everything that is drawn, once it was asked for: nearly every pass binds it.
     objects: OnceCell<Bind>,
 }
@@ -147,7 +150,7 @@ impl<'a> Frame<'a> {
             items,
             clip_from_eye: DMat4::IDENTITY,
             camera: Frame::camera(view),
-            visibility: OnceCell::new(),
+            shadows: OnceCell::new(),
             objects: OnceCell::new(),
         };
         frame.clip_from_eye = frame.projection() * frame.rotation();
@@ -379,6 +382,12 @@ fn scatter(material: &Material) -> DVec3 {
 pub fn extent(object: &Object) -> f64 {
     let (min, max) = shape::bounds(object);
     (max - min).max_element()
+}
+
+/// The diagonal of that box.
+fn diagonal(object: &Object) -> f64 {
+    let (min, max) = shape::bounds(object);
+    min.distance(max)
 }
 
 /// A ball in which an object certainly lies: its centre in the world, and its radius, scene units.

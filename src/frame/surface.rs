@@ -5,7 +5,7 @@ use crate::geometry::mesh::Mesh;
 use crate::gpu::{Bind, Buffer, Draw, Format, Gpu, Images, Shader, Shape};
 use crate::image::Texture;
 use crate::problem::{Problem, counted};
-use crate::scene::{AsNumber, Material, TextureMap, Varying};
+use crate::scene::{AsNumber, Material, Object, TextureMap, Varying, shape};
 use crate::store::{Key, Plan, Run, Slot, Step};
 use half::f16;
 use serde::Serialize;
@@ -58,6 +58,11 @@ impl<'a> Surface<'a> {
         self.frame.object(self.item(member)).map_or(0.0, super::extent)
     }
 
+    /// The diagonal of that box, scene units.
+    pub fn diagonal(&self, member: &Member) -> f64 {
+        self.frame.object(self.item(member)).map_or(0.0, super::diagonal)
+    }
+
     pub fn shader(&self, name: &str, flags: &[&str]) -> Result<Shader, Problem> {
         self.frame.shaders.load(name, flags)
     }
@@ -104,7 +109,24 @@ impl<'a> Surface<'a> {
         member: &Member,
         normals: Slot<Buffer>,
     ) -> Result<Option<Slot<Buffer>>, Problem> {
-        self.frame.sky_irradiance(plan, self.item(member), normals)
+        self.frame.sky_irradiance(plan, self.item(member), member.mesh, normals)
+    }
+
+    /// Transmitted irradiance at points of a member's surface, `vec4f` each with 0 for w: what `environment` and all lamps
+    /// send in, with their shadows, W/m². The points are the vertices of a mesh in the member's space: its own mesh, for
+    /// its own vertices, or any other, of which the triangles do not matter.
+    pub fn irradiance(&self, plan: &mut Plan, member: &Member, points: Slot<Mesh>) -> Result<Slot<Buffer>, Problem> {
+        self.frame.irradiance(plan, member.place, points)
+    }
+
+    /// The mesh's positions, as a vertex stream.
+    pub fn positions(&self, plan: &mut Plan, member: &Member) -> Slot<Buffer> {
+        upload::stream(plan, member.mesh, upload::Stream::Positions)
+    }
+
+    /// Whether steps that can hardly change the picture are left out.
+    pub fn skips(&self) -> bool {
+        self.frame.view.skip
     }
 
     /// The mesh's own normals, as a vertex stream.
@@ -133,6 +155,34 @@ impl<'a> Surface<'a> {
         upload::list(plan, vectors, "a vector per vertex")
     }
 
+    /// A member's place in the table of objects.
+    pub fn place(&self, member: &Member) -> u32 {
+        member.place as u32
+    }
+
+    /// A list, on the device as it is.
+    pub fn upload_list<T>(&self, plan: &mut Plan, values: Slot<Vec<T>>, about: &'static str) -> Slot<Buffer>
+    where
+        T: bytemuck::Pod + Send + Sync,
+    {
+        upload::list(plan, values, about)
+    }
+
+    /// The positions of a mesh's vertices, then their normals, as vertex streams.
+    pub fn points(&self, plan: &mut Plan, mesh: Slot<Mesh>) -> [Slot<Buffer>; 2] {
+        [upload::Stream::Positions, upload::Stream::Normals].map(|stream| upload::stream(plan, mesh, stream))
+    }
+
+    /// A member's mesh before it was deformed, vertex by vertex and triangle by triangle the same: what is baked from it
+    /// holds at all times.
+    pub fn rest(&self, plan: &mut Plan, member: &Member) -> Slot<Mesh> {
+        let object = self.frame.object(self.item(member)).expect("a member is an object");
+        match object.deform.is_empty() {
+            true => member.mesh,
+            false => shape::mesh(plan, &Object { deform: Vec::new(), ..object.clone() }, 0.0),
+        }
+    }
+
     /// The member, to be drawn with the given streams after its positions.
     pub fn draw(&self, plan: &mut Plan, member: &Member, streams: Vec<Slot<Buffer>>) -> Draw {
         let mut all = vec![upload::stream(plan, member.mesh, upload::Stream::Positions)];
@@ -144,7 +194,12 @@ impl<'a> Surface<'a> {
         }
     }
 
-    fn item(&self, member: &Member) -> &'a Item {
+    /// Several pictures of which each is 0 where the others' objects are.
+    pub fn merge(&self, plan: &mut Plan, pictures: &[Slot<Images>]) -> Result<Option<Slot<Images>>, Problem> {
+        self.frame.merge(plan, pictures)
+    }
+
+    pub(super) fn item(&self, member: &Member) -> &'a Item {
         &self.frame.items[member.place]
     }
 }

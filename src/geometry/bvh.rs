@@ -145,6 +145,11 @@ impl Bvh {
         hits
     }
 
+    /// Every triangle as rays see it, scene units.
+    pub fn triangles(&self) -> impl Iterator<Item = [DVec3; 3]> {
+        self.corners.iter().map(|corners| corners.map(|p| self.scale * p.as_dvec3() + self.center))
+    }
+
     fn closest(&self, mut local: Local, is_left_out: impl Fn((u32, u32)) -> bool) -> Option<Hit> {
         let mut best = None;
         let mut found = RayHit::none();

@@ -4,8 +4,11 @@
 //! them: threads share the work by items, and every sum runs in a fixed order.
 
 pub mod bvh;
+pub mod clearance;
 pub mod deform;
 pub mod depth_map;
+mod intrinsic;
+pub mod laplacian;
 pub mod mesh;
 pub mod nearest;
 pub mod neighbours;
@@ -15,5 +18,7 @@ pub mod plane_fit;
 mod polygon;
 pub mod sculpture;
 pub mod shapes;
+pub mod spectrum;
 pub mod tangents;
+pub mod thickness;
 pub mod visibility;

@@ -27,7 +27,7 @@ mod texture;
 pub use bind::{Bind, Sampler, Uniform};
 pub use device::{Gpu, adapters, how_to_get_an_adapter, is_software};
 pub use look::Texel;
-pub use pass::{Blend, Compute, Cover, Depth, Draw, Fullscreen, Layer, Raster};
+pub use pass::{Blend, Compute, Count, Cover, Depth, Dispatch, Dispatches, Draw, Fullscreen, Layer, Raster};
 pub use shader::{Shader, Shaders};
 pub use texture::{Format, Shape, Texture};
 

@@ -2,7 +2,7 @@
 //!
 //! Every pass writes all of what it makes; colours start at 0 and depth, which is reversed everywhere (1 near, 0 far), at 0.
 
-use super::bind::{self, Bind, Ready};
+use super::bind::{self, Bind};
 use super::device::{Gpu, Pipeline};
 use super::shader::Shader;
 use super::texture::{Format, Shape, Texture};
@@ -142,6 +142,37 @@ impl Step for Fullscreen {
     }
 }
 
+/// One dispatch of [`Dispatches`]: so many elements, 64 a workgroup, with what only it binds.
+#[derive(Clone, Serialize)]
+pub struct Dispatch {
+    pub count: u64,
+    pub binds: Vec<(&'static str, Bind)>,
+}
+
+/// How many elements a buffer has.
+#[derive(Clone, Copy, Serialize)]
+pub enum Count {
+    Known(u64),
+    /// As many as another, whose elements are so many bytes long.
+    Of(Slot<Buffer>, u32),
+}
+
+/// Runs a compute shader several times over one buffer of `count` elements, which begins as zeros: each dispatch sees
+/// what those before it wrote.
+#[derive(Serialize)]
+pub struct Dispatches {
+    pub name: &'static str,
+    /// For people: no part of the pass's name.
+    #[serde(skip)]
+    pub about: String,
+    pub shader: Shader,
+    /// The name of the shader's output, and the bytes of one of its elements.
+    pub output: (&'static str, u32),
+    pub count: Count,
+    pub dispatches: Vec<Dispatch>,
+    pub binds: Vec<(&'static str, Bind)>,
+}
+
 impl Step for Compute {
     type Output = Buffer;
     fn name(&self) -> &'static str {
@@ -151,37 +182,68 @@ impl Step for Compute {
         self.about.clone()
     }
     fn run(&self, run: &Run) -> Result<Buffer, Problem> {
-        let gpu: &Gpu = run.host();
         let count = run.get(self.over).bytes / self.over_stride as u64;
-        let is_float = look::float_words(&self.shader, self.output.0);
-        let output = Arc::new(Buffer::empty(gpu, count * self.output.1 as u64, is_float));
-        let wanted = bind::wanted(&self.shader, &["compute"]);
-        let ready = bind::pair(gpu, run, &self.shader, &wanted, &self.binds, Some((self.output.0, &output)))?;
-        let entries = bind::entries(&wanted, &ready);
-        let Pipeline::Compute(pipeline, layout) = compute_pipeline(gpu, self.name, &self.shader, &entries) else {
-            unreachable!("a compute pass has a compute pipeline")
+        let dispatch = Dispatch { count, binds: Vec::new() };
+        compute(run, self.name, &self.shader, self.output, count, &[dispatch], &self.binds)
+    }
+}
+
+impl Step for Dispatches {
+    type Output = Buffer;
+    fn name(&self) -> &'static str {
+        self.name
+    }
+    fn about(&self) -> String {
+        self.about.clone()
+    }
+    fn run(&self, run: &Run) -> Result<Buffer, Problem> {
+        let count = match self.count {
+            Count::Known(count) => count,
+            Count::Of(other, stride) => run.get(other).bytes / stride as u64,
         };
-        let group = bind::group(&gpu.device, &layout, &wanted, &ready);
-        let stopwatch = gpu.stopwatch();
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        {
-            let timestamp_writes = stopwatch.as_ref().map(|query_set| wgpu::ComputePassTimestampWrites {
-                query_set,
-                beginning_of_pass_write_index: Some(0),
-                end_of_pass_write_index: Some(1),
-            });
-            let mut pass =
-                encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(self.name), timestamp_writes });
+        compute(run, self.name, &self.shader, self.output, count, &self.dispatches, &self.binds)
+    }
+}
+
+fn compute(
+    run: &Run,
+    name: &'static str,
+    shader: &Shader,
+    (output_name, stride): (&'static str, u32),
+    count: u64,
+    dispatches: &[Dispatch],
+    shared: &[(&'static str, Bind)],
+) -> Result<Buffer, Problem> {
+    let gpu: &Gpu = run.host();
+    let is_float = look::float_words(shader, output_name);
+    let output = Arc::new(Buffer::empty(gpu, count * stride as u64, is_float));
+    let wanted = bind::wanted(shader, &["compute"]);
+    let stopwatch = gpu.stopwatch();
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    {
+        let timestamp_writes = stopwatch.as_ref().map(|query_set| wgpu::ComputePassTimestampWrites {
+            query_set,
+            beginning_of_pass_write_index: Some(0),
+            end_of_pass_write_index: Some(1),
+        });
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(name), timestamp_writes });
+        for Dispatch { count, binds } in dispatches {
+            let mut all = binds.clone();
+            all.extend(shared.iter().cloned());
+            let ready = bind::pair(gpu, run, shader, &wanted, &all, Some((output_name, &output)))?;
+            let entries = bind::entries(&wanted, &ready);
+            let Pipeline::Compute(pipeline, layout) = compute_pipeline(gpu, name, shader, &entries) else {
+                unreachable!("a compute pass has a compute pipeline")
+            };
             pass.set_pipeline(&pipeline);
-            pass.set_bind_group(0, &group, &[]);
+            pass.set_bind_group(0, &bind::group(&gpu.device, &layout, &wanted, &ready), &[]);
             let groups = count.div_ceil(64) as u32;
             // A dispatch has at most 65,535 groups along an axis: the shader puts the two together again.
             pass.dispatch_workgroups(groups.min(ROW_OF_GROUPS), groups.div_ceil(ROW_OF_GROUPS), 1);
         }
-        gpu.submit(run, self.name, encoder, stopwatch)?;
-        drop::<Vec<Ready>>(ready);
-        Ok(Arc::into_inner(output).expect("nothing holds the output any more"))
     }
+    gpu.submit(run, name, encoder, stopwatch)?;
+    Ok(Arc::into_inner(output).expect("nothing holds the output any more"))
 }
 
 fn draw(run: &Run, raster: &Raster) -> Result<Images, Problem> {

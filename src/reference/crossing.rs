@@ -3,7 +3,6 @@
 
 use super::boundary::Facing;
 use super::light::Lamp;
-use super::lobe::Lobe;
 use super::path::{Inside, Walk};
 use super::random::Random;
 use super::volume::{Light, Tracer, around};
@@ -95,7 +94,6 @@ impl Tracer {
             if beyond.innermost().is_none() {
                 self.join_at(walk, &facing, &point, random);
             }
-            walk.lobes = None;
             let h = facing.microfacet(d, random.pair());
             let split = facing.split_at(d, h);
             let refracted = split.refracted.map_or(0.0, |to| facing.unhidden(d, to, false));
@@ -108,7 +106,9 @@ impl Tracer {
             // Both ways: the light outside is looked up, and the path goes on inside.
             let own = density(to);
             let met = self.world.meet(point.p, to, f64::INFINITY, Some(point.place));
-            walk.add(refracted_share * self.shining(point.p, to, met.as_ref(), own, 0.0));
+            let left = |lamp: &Lamp| if facing.is_smooth() { self.left_by_lobe(walk, &point, lamp) } else { 1.0 };
+            walk.add(refracted_share * self.shining_but(point.p, to, met.as_ref(), own, 0.0, left));
+            walk.lobes = None;
             let is_lit = met.is_some_and(|met| !self.is_emitter(&met));
             if is_lit && self.light == Light::Full && random.unit() < 1.0 - split.reflectance {
                 walk.weight.value *= refracted_share / (1.0 - split.reflectance);
@@ -122,6 +122,7 @@ impl Tracer {
             (walk.direction, walk.density) = (split.reflected, None);
             return reflected_share > 0.0 && !self.single;
         }
+        walk.lobes = None;
         let goes_in = out.is_some() && random.unit() >= split.reflectance;
         if goes_in {
             walk.weight.value *= refracted_share / (1.0 - split.reflectance);
@@ -161,16 +162,11 @@ impl Tracer {
     /// Adds the light of lamps outside at a rough boundary that a path meets from inside.
     fn join_at(&self, walk: &mut Walk, facing: &Facing, point: &Point, random: &mut Random) {
         let d = walk.direction;
-        // Lamps that were joined to the path's last vertex through here have their share already.
-        let joined = |lamp: Option<&Lamp>, own: f64| {
-            let (thing, p) = walk.lobes.filter(|(thing, _)| *thing == point.thing())?;
-            Some(Lobe::new(self, lamp?, thing, p)?.density(d) / own)
-        };
         let light = self.joined(point, random, |lamp, ray| match ray.direction.dot(point.flat) > 0.0 {
             true => {
                 let (value, density) = facing.value(d, ray.direction);
-                let joined = walk.density.filter(|_| value > 0.0).and_then(|own| joined(lamp, own));
-                (value / (1.0 + joined.unwrap_or(0.0)), density)
+                let left = lamp.filter(|_| value > 0.0).map_or(1.0, |lamp| self.left_by_lobe(walk, point, lamp));
+                (left * value, density)
             }
             false => (0.0, 0.0),
         });

@@ -177,7 +177,12 @@ impl Tracer {
         let mut weight = walk.weight;
         let sigma_t = medium.map_or(Rgb::ZERO, Medium::sigma_t);
         let free = free_path(sigma_t[weight.hero], random);
-        let point = met.or_else(|| self.world.meet(walk.origin, walk.direction, free, walk.on));
+        // Where no surface is near none need be looked for; most of what lies deep is spared the search.
+        let clear = walk.inside.innermost().map_or(0.0, |thing| self.world.clearance(thing, walk.origin));
+        let point = met.or_else(|| match free < clear {
+            true => None,
+            false => self.world.meet(walk.origin, walk.direction, free, walk.on),
+        });
         let end = match (point, medium) {
             (Some(point), _) => {
                 let through = (-sigma_t * point.t).exp();

@@ -62,6 +62,15 @@ impl Lamp {
         }
     }
 
+    /// The direction from `p` to the lamp, or to the middle of one with extent.
+    pub fn middle(&self, p: DVec3) -> DVec3 {
+        match self.kind {
+            Kind::Directional { direction, .. } => -direction,
+            Kind::Point { position, .. } => (position - p).normalize(),
+            Kind::Rect { center, .. } => (center - p).normalize(),
+        }
+    }
+
     /// Light that reaches `p`; none from the dark side of an area light.
     pub fn sample(&self, p: DVec3, random: &mut Random) -> Option<Ray> {
         let Kind::Rect { center, u, v, radiance } = self.kind else { return self.ray(p) };

@@ -4,8 +4,8 @@
 //! function, boundaries reflect and refract by Fresnel or by GGX microfacets; nothing is approximated. One path serves three
 //! channels: its free paths are drawn for one of them, and its weight is the balance heuristic over all three (spectral
 //! multiple importance sampling [Wilkie2014]), so that no channel's weight exceeds 3. Lamps are joined to each vertex that
-//! can see them; those without extent also through a refracting boundary ([`super::refracted`], [`super::lobe`]), where few
-//! paths or none would find them.
+//! can see them, and through refracting boundaries too ([`super::refracted`], [`super::lobe`]), where few paths or none
+//! would find them.
 //!
 //! Radiance is counted per squared index of the medium that it travels in. Lengths are scene units.
 
@@ -153,6 +153,19 @@ impl Tracer {
     /// What lamps with extent and the sky send along a ray in empty space, of which a vertex with that density of
     /// directions takes its share; `met` is what the ray meets first, and `passed` how far behind `p` the vertex lies.
     pub(super) fn shining(&self, p: DVec3, d: DVec3, met: Option<&Point>, density: Option<f64>, passed: f64) -> Rgb {
+        self.shining_but(p, d, met, density, passed, |_| 1.0)
+    }
+
+    /// Likewise; of each lamp only the share that `left` says.
+    pub(super) fn shining_but(
+        &self,
+        p: DVec3,
+        d: DVec3,
+        met: Option<&Point>,
+        density: Option<f64>,
+        passed: f64,
+        left: impl Fn(&Lamp) -> f64,
+    ) -> Rgb {
         let density = density.filter(|_| self.joins);
         let share = |own: f64| density.map_or(1.0, |density| density / (density + own));
         let mut sum = Rgb::ZERO;
@@ -162,15 +175,27 @@ impl Tracer {
             sum += share(sky.density(d)) * sky.radiance(d);
         }
         for (i, lamp) in self.lamps.iter().enumerate().filter(|(_, lamp)| lamp.has_extent()) {
-            let seen = match lamp.shadow {
-                true => met.filter(|point| self.world.things[point.thing()].lamp() == Some(i)).map(|point| point.t * d),
-                false => lamp.meet(p, d),
-            };
-            if let Some((radiance, own)) = seen.and_then(|to| lamp.radiance(to + passed * d)) {
-                sum += share(own) * radiance;
+            if let Some((radiance, own)) = self.shown(i, p, d, met, passed) {
+                sum += share(own) * left(lamp) * radiance;
             }
         }
         sum
+    }
+
+    /// The radiance of an area light along a ray, if that meets it, and the density of its direction in [`Lamp::sample`].
+    pub(super) fn shown(
+        &self,
+        lamp: usize,
+        p: DVec3,
+        d: DVec3,
+        met: Option<&Point>,
+        passed: f64,
+    ) -> Option<(Rgb, f64)> {
+        let to = match self.lamps[lamp].shadow {
+            true => met.filter(|point| self.world.things[point.thing()].lamp() == Some(lamp))?.t * d,
+            false => self.lamps[lamp].meet(p, d)?,
+        };
+        self.lamps[lamp].radiance(to + passed * d)
     }
 
     pub(super) fn is_emitter(&self, point: &Point) -> bool {
@@ -235,14 +260,9 @@ impl Tracer {
         if let Some((ray, shadow)) = self.sky_sample(random).filter(|_| !refracts) {
             self.join(walk, &ray, shadow, phase(ray.direction), random);
         }
+        walk.lobes = None;
         if let Some(thing) = walk.inside.only() {
-            let own = |to| walk.weight.mixed(phase(to));
-            for lamp in self.lamps.iter().filter(|lamp| !lamp.has_extent()) {
-                if let Some((to, light)) = self.through_rough(walk, lamp, thing, own, random) {
-                    walk.sum.scattered += walk.color * walk.weight.value * phase(to) * light;
-                }
-            }
-            walk.lobes = Some((thing, walk.origin));
+            self.join_lobes(walk, thing, phase, random);
         }
         let parameter = medium.parameter[walk.weight.hero];
         walk.direction = around(from, -medium.phase.sample(random.unit(), parameter), random.unit());
@@ -284,7 +304,11 @@ impl Tracer {
         let nearest = match lamp.kind {
             Kind::Directional { .. } => f64::INFINITY,
             Kind::Point { position, .. } => position.distance(ball.center),
-            Kind::Rect { center, u, v, .. } => center.distance(ball.center) - u.length() - v.length(),
+            Kind::Rect { center, u, v, .. } => {
+                let to = ball.center - center;
+                let along = |edge: DVec3| (to.dot(edge) / edge.length_squared()).clamp(-1.0, 1.0) * edge;
+                to.distance(along(u) + along(v))
+            }
         };
         nearest > ball.radius && self.world.things[thing].refracts()
     }

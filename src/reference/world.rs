@@ -4,11 +4,13 @@ use super::boundary::Facing;
 use super::bssrdf::Bssrdf;
 use super::layers::{Layers, Strata};
 use crate::geometry::bvh::{Bvh, Hit};
+use crate::geometry::clearance::Clearance;
 use crate::geometry::mesh::Mesh;
 use crate::optics::Rgb;
 use crate::optics::phase::Phase;
 use crate::scene::{TextureMap, Varying};
 use glam::{DAffine3, DMat3, DVec3};
+use rayon::prelude::*;
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -66,6 +68,8 @@ pub struct World {
     pub balls: Vec<Ball>,
     /// The layers of each thing that has some, in space.
     pub strata: Vec<Option<Strata>>,
+    /// How far it is from within each thing that light goes through to any surface, at least.
+    clearances: Vec<Option<Clearance>>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -102,7 +106,20 @@ impl World {
         let meshes: Vec<(&Mesh, DAffine3)> =
             things.iter().map(|thing| (thing.mesh.as_ref(), thing.world_from_object)).collect();
         let strata = things.iter().map(Strata::of).collect();
-        World { bvh: Bvh::new(&meshes), balls: things.iter().map(Thing::ball).collect(), strata, things }
+        let bvh = Bvh::new(&meshes);
+        let clearances = things.par_iter().map(|thing| thing.clearance(&bvh)).collect();
+        let balls = things.iter().map(Thing::ball).collect();
+        World { bvh, balls, strata, clearances, things }
+    }
+
+    /// How far it is from a point to any surface, at least; 0 where that is not known, as outside of the thing.
+    pub fn clearance(&self, thing: usize, p: DVec3) -> f64 {
+        self.clearances[thing].as_ref().map_or(0.0, |clearance| clearance.at(p))
+    }
+
+    /// A guess of how far it is from a point in a thing along a direction to a surface, `enough` at most.
+    pub fn guess(&self, thing: usize, p: DVec3, direction: DVec3, enough: f64) -> f64 {
+        self.clearances[thing].as_ref().map_or(0.0, |clearance| clearance.guess(p, direction, enough))
     }
 
     /// What a ray meets first within `t_max`, on either side; never the triangle `from` that it starts on.
@@ -136,11 +153,23 @@ impl World {
 }
 
 impl Thing {
+    /// None of what light does not go through.
+    fn clearance(&self, bvh: &Bvh) -> Option<Clearance> {
+        let Matter::Translucent { .. } = self.matter else { return None };
+        let (min, max) = self.bounds();
+        Some(Clearance::new(min, max, bvh.triangles()))
+    }
+
+    /// World space.
+    fn bounds(&self) -> (DVec3, DVec3) {
+        let corners = self.mesh.positions.iter().map(|p| self.world_from_object.transform_point3(p.as_dvec3()));
+        corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)))
+    }
+
     /// Around the middle of its box. Wide enough for the f32 in which rays see its corners.
     fn ball(&self) -> Ball {
         let corners = || self.mesh.positions.iter().map(|p| self.world_from_object.transform_point3(p.as_dvec3()));
-        let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        let (min, max) = corners().fold(nothing, |(min, max), p| (min.min(p), max.max(p)));
+        let (min, max) = self.bounds();
         let center = 0.5 * (min + max);
         let radius = corners().map(|p| p.distance(center)).fold(0.0, f64::max);
         Ball { center, radius: 1.0001 * radius }

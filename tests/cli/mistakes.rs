@@ -146,23 +146,18 @@ fn an_empty_obj() {
 }
 
 #[test]
-fn a_kernel_that_is_not_there_yet() {
-    material(
-        "Material(version: 1,\n  filter: Gaussian(width: 0.5))",
-        r#"stone.ron:2:11: error: filter: FilteredNormals has no kernel Gaussian in this version
-  |
-2 |   filter: Gaussian(width: 0.5))
-  |           ^^^^^^^^^^^^^^^^^^^^
-  = hint: write Neighbours(…) or FromMedium(), or render with --technique 'Opaque()'"#,
-    );
-    // It is told where it is written, in the base, and only while filtered normals ask for it.
+fn a_kernel_that_is_too_steep_for_an_engine() {
+    // It is told where it is written, in the base, and only while that engine is asked for.
     let desk = Desk::new();
     desk.write("stone.ron", "Material(version: 1, base: \"rock.ron\")");
-    desk.write("rock.ron", "Material(version: 1, filter: Curve(points: [(0, 1)]))");
-    desk.run(&["explain", "scene.ron"]).ok();
-    let words = ["explain", "scene.ron", "--technique", "FilteredNormals()"];
-    desk.run(&words).fails(1, &["rock.ron:1:30: error: filter: FilteredNormals has no kernel Curve in this version"]);
-    desk.write("scene.ron", SCENE.replace("Opaque()", "FilteredNormals()"));
+    desk.write("rock.ron", "Material(version: 1, filter: Box(wavelength: 2))");
+    desk.run(&["explain", "scene.ron", "--technique", "FilteredNormals()"]).ok();
+    let words = ["explain", "scene.ron", "--technique", "FilteredNormals(engine: Krylov)"];
+    desk.run(&words).fails(
+        1,
+        &["rock.ron:1:30: error: filter: this kernel falls too steeply for FilteredNormals(engine: Krylov)", "Auto"],
+    );
+    desk.write("scene.ron", SCENE.replace("Opaque()", "FilteredNormals(engine: Krylov)"));
     desk.run(&["explain", "scene.ron", "--technique", "Opaque()"]).ok();
 }
 

@@ -9,15 +9,21 @@ use half::f16;
 use std::collections::HashSet;
 
 /// Steps that make something else than light, by the beginning of their names: what they make may be negative.
-const SIGNED: [(&str, &str); 8] = [
+const SIGNED: [(&str, &str); 14] = [
     ("geometry.", "positions and normals"),
     ("filtered_normals.", "normals"),
     ("frame.gbuffer", "positions"),
     ("frame.openness", "spherical harmonics of what is open"),
     ("frame.through", "a depth: where a ray leaves less where it enters"),
+    ("profile.disk_means", "logarithms"),
+    ("screen.sums", "places"),
+    ("long_range.splats", "places, normals, and area that pixels counted too much"),
+    ("long_range.far", "the pixel that a block's light is for, -1 for none, beside the light"),
     ("sky.light", "directions, beside the light from there"),
     ("sky.lamps", "directions, likewise"),
     ("layered.", "planes, and slopes of maps"),
+    ("sky.harmonics", "spherical harmonics of light"),
+    ("thickness.", "spherical harmonics"),
 ];
 
 /// Steps whose halves stand for whatever is brighter, too: a sun in a sky's image.

@@ -61,7 +61,7 @@ impl Frame<'_> {
         let light = self.sky_light(plan, &surroundings);
         let mut binds = vec![("directions", Bind::Buffer(light)), ("lamp_of", Bind::Buffer(lamp_of))];
         let mut flags = Vec::new();
-        if let Some(visible) = self.sky_visibility(plan, item, &surroundings) {
+        if let Some(visible) = self.sky_visibility(plan, item, item.mesh, &surroundings) {
             flags.push("OCCLUDED");
             binds.push(("visible", Bind::Buffer(visible)));
         }

@@ -5,11 +5,13 @@
 //! normal a technique hands over, so that editing the sky, the material or the normals casts no ray. What deforms sees the
 //! whole sky and hides none of it: `explain` says so.
 
+mod harmonics;
 mod lamps;
 mod light;
 mod mirror;
 
 use super::{Frame, Item, tables, upload};
+use crate::geometry::mesh::Mesh;
 use crate::gpu::{Bind, Buffer, Compute, Sampler};
 use crate::image::Texture;
 use crate::problem::Problem;
@@ -77,8 +79,14 @@ impl Frame<'_> {
         self.object(item).is_none_or(|object| object.deform.is_empty())
     }
 
-    /// One bit per vertex and direction, or none where the sky counts as open.
-    fn sky_visibility(&self, plan: &mut Plan, item: &Item, surroundings: &Surroundings) -> Option<Slot<Buffer>> {
+    /// One bit per point of the item and direction, or none where the sky counts as open.
+    fn sky_visibility(
+        &self,
+        plan: &mut Plan,
+        item: &Item,
+        points: Slot<Mesh>,
+        surroundings: &Surroundings,
+    ) -> Option<Slot<Buffer>> {
         if !surroundings.shadow {
             plan.skip("shadows of the surroundings", "shadow: false");
             return None;
@@ -98,7 +106,7 @@ impl Frame<'_> {
             .filter(|other| self.is_rigid(other))
             .map(|other| (other.mesh, here * other.world_from_object))
             .collect();
-        let words = plan.bake(SkyVisibility { mesh: item.mesh, turned: here * item.world_from_object, occluders });
+        let words = plan.bake(SkyVisibility { mesh: points, turned: here * item.world_from_object, occluders });
         Some(upload::list(plan, words, "visible directions"))
     }
 
@@ -112,11 +120,12 @@ impl Frame<'_> {
         surroundings.image.map(|image| plan.bake(SkyCells { image, rotation: surroundings.rotation }))
     }
 
-    /// The irradiance that enters at each vertex from the surroundings, for a normal each; 16 bytes a vertex.
+    /// The irradiance that enters at each vertex of `points` from the surroundings, for a normal each; 16 bytes a vertex.
     pub(super) fn sky_irradiance(
         &self,
         plan: &mut Plan,
         item: &Item,
+        points: Slot<Mesh>,
         normals: Slot<Buffer>,
     ) -> Result<Option<Slot<Buffer>>, Problem> {
         let Some(surroundings) = self.surroundings(plan) else { return Ok(None) };
@@ -127,7 +136,7 @@ impl Frame<'_> {
             eta: eta as f32,
             words: (DIRECTIONS / 32) as u32,
         };
-        let visible = self.sky_visibility(plan, item, &surroundings);
+        let visible = self.sky_visibility(plan, item, points, &surroundings);
         let mut binds = vec![
             ("vertices", Bind::uniform(&vertices)),
             ("normals", Bind::Buffer(normals)),
@@ -152,7 +161,7 @@ impl Frame<'_> {
     /// How open the sky is from each vertex, for reflections; none where it counts as open.
     pub(super) fn openness(&self, plan: &mut Plan, item: &Item) -> Result<Option<Slot<Buffer>>, Problem> {
         let Some(surroundings) = self.surroundings(plan) else { return Ok(None) };
-        let Some(visible) = self.sky_visibility(plan, item, &surroundings) else { return Ok(None) };
+        let Some(visible) = self.sky_visibility(plan, item, item.mesh, &surroundings) else { return Ok(None) };
         let over = upload::stream(plan, item.mesh, upload::Stream::Positions);
         let light = self.sky_light(plan, &surroundings);
         Ok(Some(plan.add(Compute {

@@ -25,6 +25,7 @@
 
 mod beam;
 mod diffusion;
+pub mod disk;
 mod normalized;
 mod radii;
 #[cfg(test)]

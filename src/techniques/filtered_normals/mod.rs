@@ -1,150 +1,258 @@
 //! FilteredNormals: the normals are smoothed over the surface, and light is gathered with them [Patro2007].
 //!
-//! Diffuse light is linear in the normal, so a low-pass filter of the normals stands in for one of the light. Each vertex's
-//! normal becomes the sum over its neighbours x_j within `radius` of n_j exp(-sigma_tr |x_i - x_j|), plus `alpha` of its own
-//! [Patro2007, eq. 3], divided by the sum of the weights. A kernel's settings stand in the material, as `filter:`
+//! Diffuse light is linear in the normal, so a low-pass filter of the normals stands in for one of the light. The kernel
+//! stands in the material, as `filter:`, per colour channel where its width is given per channel:
 //!
-//! - `weights: Area` gives every neighbour the area that it stands for, so that a re-triangulated mesh gives the same field;
-//!   `Uniform` is the literal equation, which does not.
+//! - `Gaussian(width:)`, `Exponential(width:)`, `Diffusion(time_mm2:)`, `Box(wavelength:)` and `Curve(points:)` weigh
+//!   frequencies on the surface, in mm: the same on any mesh of the same shape.
+//! - `Normalized(std:)` is the paper's own Gaussian, whose axis the mesh's edges decide.
+//! - `FromMedium()`, the default, is (1 + (omega/sigma_tr)²)^(-3/2) with the medium's sigma_tr, per channel. A sigma_tr below
+//!   6 / size counts as that: normals average to nothing over a closed object, which light never does.
+//! - `Neighbours(…)` sums over the vertices within `radius` with weights exp(-sigma_tr r), plus `alpha` of the own normal
+//!   [Patro2007, eq. 3]. `weights: Area` gives every neighbour the area that it stands for, so that a re-triangulated mesh
+//!   gives the same field; `Uniform` is the literal equation, which does not: `scenes/neighbours-and-spectrum.ron`.
 //! - `length: Keep` leaves the result shorter where normals disagree, and so dims, as diffusion does; `Unit` does not.
-//! - `filter: FromMedium()`, the default, is this kernel with the mean of the medium's sigma_tr over the channels, alpha 0
-//!   and a radius of 7/sigma_tr, beyond which less than a hundredth of the weight lies. A medium without absorption has no
-//!   such length: half of the object's size serves.
 //!
-//! Costs: a bake per shape and kernel, which looks at every pair of neighbours; after it a frame costs exactly what
-//! `Opaque` costs, with the same steps: that is the method's point.
+//! How frequencies are told apart is the setting `engine`:
 //!
-//! Fails where light crosses the inside: thin parts stay dark against the light, and a shadow's edge stays sharp, since
-//! only the normals are filtered and not the light. One normal serves all channels, so no colour bleeds at the terminator.
-//! `scenes/first-light.ron` shows it in the ears. Shadows are looked up a scattering length above the surface, or an object
-//! would shade its own terminator where its smoothed normals still face the light.
+//! - `Krylov` makes a small basis for this one field of normals. Smooth kernels come out to a thousandth or better, over the
+//!   whole spectrum, on slivers too. The bake takes about ten solves of a sparse system; it is made for a step of widths, a
+//!   factor of 4, so that an edit within it finds it there.
+//! - `Harmonics` finds the eigenpairs of the mesh up to the paper's omega_m (a wavelength of ten edges) or to where the
+//!   kernel has ended; what lies above is weighted as a whole [Patro2007, eq. 11]. The bake is a hundred times longer.
+//! - `Auto` takes eigenpairs for a Box, a Normalized, and a curve as steep as a box, and Krylov for all else.
 //!
-//! Not there yet: the kernels `Gaussian`, `Exponential`, `Diffusion`, `Box`, `Normalized` and `Curve`, which need the
-//! spectrum of the mesh.
+//! The setting `signal: Irradiance` filters light instead: what falls on the vertices, shadows and all, spreads over the edges
+//! of shadows, which filtered normals leave as they are, and none of it is lost. It needs eigenpairs to where the kernel has
+//! ended, and in every frame two passes over all modes of all vertices: `scenes/shadow-edge.ron`.
+//!
+//! Costs: the bake; after it a frame costs exactly what `Opaque` costs, with the same steps, and one pass over the
+//! vertices when the kernel is edited: that is the method's point. On the device lie two bytes per vertex and mode (at most
+//! 81 modes by Krylov; 64 MiB in all, and where that is less than there should be, modes end earlier) and 32 per vertex. A kernel that differs between channels has three normals: each light and
+//! the surroundings are then gathered three times.
+//!
+//! Fails where light crosses the inside: thin parts stay dark against the light, as `scenes/first-light.ron` shows in the
+//! ears; and a shadow's edge stays sharp where normals are filtered and not the light. Shadows are looked up a
+//! scattering length above the surface, or an object would shade its own terminator where its smoothed normals still face
+//! the light.
 //!
 //! ```
 //! use diaphane::scene::TechniqueText;
-//! let text = TechniqueText::from_flag("--technique", "FilteredNormals()")?;
+//! let text = TechniqueText::from_flag("--technique", "FilteredNormals(engine: Krylov)")?;
 //! diaphane::techniques::read(&text)?;
 //! # Ok::<(), diaphane::problem::Problem>(())
 //! ```
 
-use super::{Scattered, Technique, local};
-use crate::frame::Surface;
-use crate::geometry::mesh::Mesh;
-use crate::geometry::neighbours::{self, Kernel};
-use crate::problem::Problem;
-use crate::scene::{Filter, Length, Material, Neighbours, Substance, Weights};
-use crate::store::{Bake, Plan, Run, Slot, Step};
-use glam::{DVec3, Vec3};
-use serde::{Deserialize, Serialize};
+mod kernel;
+mod light;
+mod steps;
 
-/// It has no settings of its own: the kernel is the material's.
+use super::local::{self, Normals};
+use super::{Scattered, Technique};
+use crate::frame::{Member, Surface};
+use crate::geometry::neighbours::Length;
+use crate::geometry::spectrum::kernel::Kernel;
+use crate::geometry::spectrum::{Band, Basis};
+use crate::gpu::{Bind, Buffer, Compute};
+use crate::problem::Problem;
+use crate::scene::Material;
+use crate::store::{Plan, Slot};
+use kernel::Kernels;
+use serde::Deserialize;
+use steps::{ENDS_STRIDE, HarmonicNormals, KernelWeights, KrylovNormals, NeighbourNormals, UploadEnds, UploadModes};
+
+/// The kernel is the material's; how it is applied stands here.
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct FilteredNormals {}
+pub struct FilteredNormals {
+    engine: Engine,
+    signal: Signal,
+}
 
-/// Where a kernel that follows from the medium ends, in units of 1/sigma_tr: on a plane, (1 + 7) e^-7 = 0.7 % of the weight
-/// lies beyond.
-const REACH: f64 = 7.0;
+/// What is filtered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+enum Signal {
+    #[default]
+    Normals,
+    /// At the vertices, with shadows.
+    Irradiance,
+}
 
-/// The kernel that a material asks for on an object half of whose size is `half`; lengths in mm.
-fn kernel(material: &Material, half: f64) -> Option<(Kernel, neighbours::Length)> {
-    let weights = |w: Weights| match w {
-        Weights::Area => neighbours::Weights::Area,
-        Weights::Uniform => neighbours::Weights::Uniform,
-    };
-    let length = |l: Length| match l {
-        Length::Keep => neighbours::Length::Keep,
-        Length::Unit => neighbours::Length::Unit,
-    };
-    match &material.filter {
-        Filter::Neighbours(kernel) => {
-            let Neighbours { sigma_tr, radius, alpha, weights: w, length: l } = *kernel;
-            // One normal serves all channels.
-            let sigma_tr = DVec3::from(sigma_tr.0).element_sum() / 3.0;
-            Some((Kernel { sigma_tr, radius, alpha, weights: weights(w) }, length(l)))
-        }
-        Filter::FromMedium(kernel) => {
-            let Substance::Translucent(medium) = &material.medium else { return None };
-            let sigma_tr = medium.sigma_tr().element_sum() / 3.0;
-            // Without absorption there is no such length. Over the whole of a closed object normals would cancel.
-            let radius = if sigma_tr > 0.0 { REACH / sigma_tr } else { half };
-            Some((Kernel { sigma_tr, radius, alpha: 0.0, weights: neighbours::Weights::Area }, length(kernel.length)))
-        }
-        _ => None,
-    }
+/// How frequencies on the mesh are told apart.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+enum Engine {
+    #[default]
+    Auto,
+    Harmonics,
+    Krylov,
 }
 
 impl Technique for FilteredNormals {
     fn plan(&self, plan: &mut Plan, surface: &Surface) -> Result<Scattered, Problem> {
-        local::scatter(plan, surface, |plan, member| {
-            if let Some(problem) = self.refuses(member.material) {
-                return Err(problem);
+        match self.signal {
+            Signal::Normals => local::scatter(plan, surface, |plan, member| self.normals(plan, surface, member)),
+            Signal::Irradiance => {
+                local::scatter_known(plan, surface, |plan, member| self.irradiance(plan, surface, member))
             }
-            let mm_per_unit = surface.mm_per_unit();
-            let half = 0.5 * surface.extent(member) * mm_per_unit;
-            let Some((kernel, length)) = kernel(member.material, half) else {
-                return Ok(surface.normals(plan, member));
-            };
-            let normals = plan.bake(NeighbourNormals { mesh: member.mesh, mm_per_unit, kernel, length });
-            Ok(surface.upload(plan, normals))
-        })
+        }
     }
 
     fn entry_mm(&self, material: &Material) -> f64 {
-        kernel(material, f64::MAX).map_or(0.0, |(kernel, _)| (1.0 / kernel.sigma_tr).min(kernel.radius))
+        if self.signal == Signal::Irradiance {
+            return 0.0;
+        }
+        Kernels::of(material, f64::INFINITY).map_or(0.0, |kernels| kernels.reach())
     }
 
     fn refuses(&self, material: &Material) -> Option<Problem> {
-        let name = match &material.filter {
-            Filter::Neighbours(_) | Filter::FromMedium(_) => return None,
-            Filter::Gaussian(_) => "Gaussian",
-            Filter::Exponential(_) => "Exponential",
-            Filter::Diffusion(_) => "Diffusion",
-            Filter::Box(_) => "Box",
-            Filter::Normalized(_) => "Normalized",
-            Filter::Curve(_) => "Curve",
-        };
-        Some(
+        let kernels = Kernels::of(material, 1.0)?;
+        if self.signal == Signal::Irradiance {
+            let needs_pairs = ("a basis that is made for normals does not hold light", "leave out engine: Krylov");
+            let refusal = light::refusal(&kernels).or((self.engine == Engine::Krylov).then_some(needs_pairs));
+            return refusal.map(|(what, hint)| material.problem("filter", what).hint(hint));
+        }
+        let Kernels::Spectral(kernels) = kernels else { return None };
+        let is_steep = kernels.iter().any(|kernel| !kernel.is_smooth());
+        (self.engine == Engine::Krylov && is_steep).then(|| {
             material
-                .problem("filter", format!("FilteredNormals has no kernel {name} in this version"))
-                .hint("write Neighbours(…) or FromMedium(), or render with --technique 'Opaque()'"),
-        )
+                .problem("filter", "this kernel falls too steeply for FilteredNormals(engine: Krylov)")
+                .hint("engine: Auto takes eigenpairs for it; or write Gaussian(width: …)")
+        })
     }
 }
 
-/// Normals after Patro's neighbour kernel.
-#[derive(Serialize)]
-struct NeighbourNormals {
-    mesh: Slot<Mesh>,
-    mm_per_unit: f64,
-    kernel: Kernel,
-    length: neighbours::Length,
-}
-
-impl Step for NeighbourNormals {
-    type Output = Vec<Vec3>;
-    fn name(&self) -> &'static str {
-        "filtered_normals.neighbours"
-    }
-    fn about(&self) -> String {
-        match self.kernel.sigma_tr > 0.0 {
-            true => format!(
-                "normals averaged over neighbours, weights falling by e in {:.3} mm",
-                1.0 / self.kernel.sigma_tr
-            ),
-            false => "normals averaged over all neighbours alike".into(),
+impl FilteredNormals {
+    fn normals(&self, plan: &mut Plan, surface: &Surface, member: &Member) -> Result<Normals, Problem> {
+        if let Some(problem) = self.refuses(member.material) {
+            return Err(problem);
+        }
+        let mm_per_unit = surface.mm_per_unit();
+        let extent = surface.extent(member);
+        let length = kernel::length(member.material);
+        match Kernels::of(member.material, 0.5 * extent * mm_per_unit) {
+            None => Ok(Normals::Same(surface.normals(plan, member))),
+            Some(Kernels::Neighbours(kernels)) => each(&kernels, |kernel| {
+                let step = NeighbourNormals { mesh: member.mesh, mm_per_unit, kernel: *kernel, length };
+                let normals = plan.bake(step);
+                Ok(surface.upload(plan, normals))
+            }),
+            Some(Kernels::Spectral(kernels)) if kernels.iter().all(Kernel::is_identity) => {
+                plan.skip(format!("filtering the normals of `{}`", member.name), "its kernel lets everything pass");
+                Ok(Normals::Same(surface.normals(plan, member)))
+            }
+            Some(Kernels::Spectral(kernels)) => {
+                let basis = self.basis(plan, member, &kernels, extent, mm_per_unit);
+                each(&kernels, |kernel| filtered(plan, surface, member, basis, kernel, length))
+            }
         }
     }
-    fn run(&self, run: &Run) -> Result<Vec<Vec3>, Problem> {
-        let mesh = run.get(self.mesh);
-        let tick = |share| run.tick(share);
-        let normals = neighbours::filter_normals(&mesh, self.mm_per_unit, &self.kernel, self.length, &tick)?;
-        Ok(normals.iter().map(|normal| normal.as_vec3()).collect())
+
+    fn irradiance(&self, plan: &mut Plan, surface: &Surface, member: &Member) -> Result<Slot<Buffer>, Problem> {
+        if let Some(problem) = self.refuses(member.material) {
+            return Err(problem);
+        }
+        let (mm_per_unit, extent) = (surface.mm_per_unit(), surface.extent(member));
+        match Kernels::of(member.material, 0.5 * extent * mm_per_unit) {
+            Some(Kernels::Spectral(kernels)) => {
+                let highest = highest(&kernels, extent, mm_per_unit);
+                light::filtered(plan, surface, member, &kernels, highest)
+            }
+            _ => surface.irradiance(plan, member, member.mesh),
+        }
+    }
+
+    /// The bake. All that its key has of the kernels is a coarse step of their widths.
+    fn basis(
+        &self,
+        plan: &mut Plan,
+        member: &Member,
+        kernels: &[Kernel; 3],
+        extent: f64,
+        mm_per_unit: f64,
+    ) -> Slot<Basis> {
+        let mesh = member.mesh;
+        let per_unit = |per_mm: f64| per_mm * mm_per_unit;
+        let why = match self.engine {
+            Engine::Krylov => None,
+            Engine::Harmonics => Some("the technique asks for them"),
+            Engine::Auto => kernels.iter().find_map(|kernel| match kernel {
+                Kernel::Normalized { .. } => Some("Normalized is a share of their axis"),
+                kernel => (!kernel.is_smooth()).then_some("the kernel is too steep for less"),
+            }),
+        };
+        if let Some(why) = why {
+            let highest = highest(kernels, extent, mm_per_unit);
+            return plan.bake(HarmonicNormals { mesh, highest, why });
+        }
+        let band = match kernels {
+            [Kernel::Normalized { .. }, ..] => {
+                let (low, high) = steps_of(kernels.each_ref().map(|kernel| kernel.knee_per_edge()));
+                Band::PerEdge(low, high)
+            }
+            _ => {
+                let knees = kernels.each_ref().map(|kernel| kernel.knee().map_or(f64::MAX, per_unit));
+                let (low, high) = steps_of(knees.map(|knee| knee * extent));
+                Band::PerUnit(low / extent, high / extent)
+            }
+        };
+        plan.bake(KrylovNormals { mesh, band })
     }
 }
 
-impl Bake for NeighbourNormals {
-    const CODE: &'static [&'static str] = &["src/geometry/", "src/techniques/filtered_normals/"];
+/// A frequency above all that kernels let pass, rad per unit; in steps of the root of 2, which is twice the pairs.
+fn highest(kernels: &[Kernel; 3], extent: f64, mm_per_unit: f64) -> f64 {
+    let ends = kernels.each_ref().map(|kernel| kernel.end().map_or(f64::MAX, |end| end * mm_per_unit * extent));
+    let end = ends.into_iter().fold(0.0, f64::max);
+    let step = (2.0 * end.log2()).ceil().clamp(0.0, 48.0);
+    2f64.powf(0.5 * step) / extent
+}
+
+/// The powers of 4 around some numbers, between those that mean anything on a mesh.
+fn steps_of(numbers: [f64; 3]) -> (f64, f64) {
+    let step = |number: f64| (number.ln() / 4f64.ln()).floor().clamp(-2.0, 12.0) as i32;
+    let steps = numbers.map(step);
+    let [low, high] = [steps.iter().min(), steps.iter().max()].map(|step| *step.expect("there are three"));
+    (4f64.powi(low), 4f64.powi(high + 1))
+}
+
+/// One for all channels when their kernels are equal.
+fn each<K: PartialEq>(
+    kernels: &[K; 3],
+    mut filtered: impl FnMut(&K) -> Result<Slot<Buffer>, Problem>,
+) -> Result<Normals, Problem> {
+    let [r, g, b] = kernels;
+    Ok(match r == g && g == b {
+        true => Normals::Same(filtered(r)?),
+        false => Normals::Each([filtered(r)?, filtered(g)?, filtered(b)?]),
+    })
+}
+
+/// The normals through one kernel.
+fn filtered(
+    plan: &mut Plan,
+    surface: &Surface,
+    member: &Member,
+    basis: Slot<Basis>,
+    kernel: &Kernel,
+    length: Length,
+) -> Result<Slot<Buffer>, Problem> {
+    let ends = plan.add(UploadEnds { basis });
+    let modes = plan.add(UploadModes { basis });
+    let weights = plan.add(KernelWeights { basis, kernel: kernel.clone(), mm_per_unit: surface.mm_per_unit() });
+    let mut flags = Vec::new();
+    let mut binds =
+        vec![("ends", Bind::Buffer(ends)), ("modes", Bind::Buffer(modes)), ("weights", Bind::Buffer(weights))];
+    if length == Length::Unit {
+        flags.push("UNIT");
+        binds.push(("unfiltered", Bind::Buffer(surface.normals(plan, member))));
+    }
+    Ok(plan.add(Compute {
+        name: "filtered_normals.reconstruct",
+        about: format!("the filtered normals of `{}`", member.name),
+        shader: surface.shader("techniques/filtered_normals/reconstruct.wgsl", &flags)?,
+        output: ("normals", 12),
+        over: ends,
+        over_stride: ENDS_STRIDE,
+        binds,
+    }))
 }

@@ -19,7 +19,8 @@
 //! # Ok::<(), diaphane::problem::Problem>(())
 //! ```
 
-use super::{Scattered, Technique, local};
+use super::local::{self, Normals};
+use super::{Scattered, Technique};
 use crate::frame::Surface;
 use crate::problem::Problem;
 use crate::store::Plan;
@@ -32,6 +33,6 @@ pub struct Opaque {}
 
 impl Technique for Opaque {
     fn plan(&self, plan: &mut Plan, surface: &Surface) -> Result<Scattered, Problem> {
-        local::scatter(plan, surface, |plan, member| Ok(surface.normals(plan, member)))
+        local::scatter(plan, surface, |plan, member| Ok(Normals::Same(surface.normals(plan, member))))
     }
 }

@@ -1,0 +1,36 @@
+// Filtered light at each vertex: its modes, and what they miss.
+
+#include "lib/element.wgsl"
+
+const NOWHERE: u32 = 0xffffffffu;
+
+// The sample of each vertex.
+@group(0) @binding(0) var<storage, read> vertices: array<u32>;
+@group(0) @binding(1) var<storage, read> modes: array<u32>;
+@group(0) @binding(2) var<storage, read> areas: array<f32>;
+@group(0) @binding(3) var<storage, read> coefficients: array<vec4f>;
+@group(0) @binding(4) var<storage, read> irradiance: array<vec4f>;
+@group(0) @binding(5) var<storage, read_write> filtered: array<vec4f>;
+
+@compute @workgroup_size(64)
+fn compute(@builtin(global_invocation_id) id: vec3u) {
+    let i = element(id);
+    if i >= arrayLength(&filtered) {
+        return;
+    }
+    let sample = vertices[i];
+    if sample == NOWHERE {
+        filtered[i] = vec4f(0.0);
+        return;
+    }
+    let count = arrayLength(&coefficients) - 1u;
+    let stride = arrayLength(&areas);
+    var sum = coefficients[0].rgb * irradiance[sample].rgb;
+    for (var p = 0u; p < (count + 1u) / 2u; p++) {
+        let values = unpack2x16float(modes[p * stride + sample]);
+        sum += values.x * coefficients[2u * p + 1u].rgb;
+        // The last pair may be half of one.
+        sum += values.y * coefficients[min(2u * p + 2u, count)].rgb;
+    }
+    filtered[i] = vec4f(sum, 0.0);
+}

@@ -1,0 +1,266 @@
+//! The Laplace-Beltrami operator of a mesh: S phi = lambda A phi, with the cotangent stiffness S and the areas A around the
+//! vertices, by which [Patro2007, eq. 4] is to be read.
+//!
+//! The equation as printed has the sign of -S and divides by a mean area, which is no Laplacian on an uneven mesh. Here S
+//! is the sum over triangles of their Dirichlet energies, so that it is positive semi-definite whatever the triangles are;
+//! they are those of the intrinsic Delaunay triangulation after mollification [Sharp2020], so that slivers neither turn
+//! weights negative nor make them huge. No length here is absolute: all are divided by the mean edge.
+//!
+//! Vertices at one position are one *sample*: a surface that was split along uv seams or creases hangs together, and its
+//! doubled vertices share one value. A sample's normal is the mean of its vertices' by area, and what tells these from each
+//! other lies above every frequency of the mesh. A vertex without a triangle of its own (or only with triangles whose
+//! corners coincide) has no sample.
+
+use super::intrinsic::Intrinsic;
+use super::mesh::{Mesh, weld};
+use glam::DVec3;
+use sprs::{CsMat, TriMat};
+
+/// No sample.
+pub const NOWHERE: u32 = u32::MAX;
+
+/// The operator, and the samples that it works on.
+pub struct Laplacian {
+    /// Symmetric, positive semi-definite; constants of each component are mapped to 0. It has no unit.
+    pub stiffness: CsMat<f64>,
+    /// The area that each sample stands for, in units of `edge`². All are positive.
+    pub areas: Vec<f64>,
+    /// Which connected part each sample belongs to, from 0.
+    pub component: Vec<u32>,
+    /// The sample of each vertex, or [`NOWHERE`].
+    pub sample: Vec<u32>,
+    /// The share of each vertex in its sample's value.
+    share: Vec<f64>,
+    /// The mean length of an edge, in the mesh's unit; 1 if there is none.
+    pub edge: f64,
+}
+
+impl Laplacian {
+    pub fn of(mesh: &Mesh) -> Laplacian {
+        let weld = weld(&mesh.positions);
+        let faces: Vec<[u32; 3]> = mesh
+            .triangles
+            .iter()
+            .map(|t| t.map(|v| weld[v as usize]))
+            .filter(|&[a, b, c]| a != b && b != c && c != a)
+            .collect();
+        let mut place = vec![NOWHERE; weld.len()];
+        faces.iter().flatten().for_each(|&v| place[v as usize] = 0);
+        let mut count = 0;
+        for place in place.iter_mut().filter(|place| **place == 0) {
+            *place = count;
+            count += 1;
+        }
+        let sample: Vec<u32> = weld.iter().map(|&v| place[v as usize]).collect();
+        let edge = match mesh.mean_edge_length() {
+            0.0 => 1.0,
+            edge => edge,
+        };
+        let length = |a: u32, b: u32| {
+            mesh.positions[a as usize].as_dvec3().distance(mesh.positions[b as usize].as_dvec3()) / edge
+        };
+        let lengths = faces.iter().map(|&[a, b, c]| [length(a, b), length(b, c), length(c, a)]).collect();
+        let corners: Vec<[u32; 3]> = faces.iter().map(|face| face.map(|v| place[v as usize])).collect();
+        let component = components(&corners, count as usize);
+        let triangles = Intrinsic::new(corners, lengths, &component);
+        let (stiffness, areas) = assemble(&triangles, count as usize);
+        Laplacian { stiffness, areas, component, share: shares(mesh, &sample, count as usize), sample, edge }
+    }
+
+    pub fn samples(&self) -> usize {
+        self.areas.len()
+    }
+
+    /// How many parts there are that share no sample.
+    pub fn components(&self) -> usize {
+        self.component.iter().max().map_or(0, |last| *last as usize + 1)
+    }
+
+    /// A field on the vertices as one on the samples.
+    pub fn at_samples(&self, field: impl IntoIterator<Item = DVec3>) -> Vec<DVec3> {
+        let mut values = vec![DVec3::ZERO; self.samples()];
+        for ((&s, share), value) in self.sample.iter().zip(&self.share).zip(field) {
+            if s != NOWHERE {
+                values[s as usize] += share * value;
+            }
+        }
+        values
+    }
+
+    /// The mean by area of a field over each component, for each sample: what no filter of frequencies above 0 touches.
+    pub fn means(&self, field: &[DVec3]) -> Vec<DVec3> {
+        let (mut sums, mut areas) = (vec![DVec3::ZERO; self.components()], vec![0.0; self.components()]);
+        for ((&c, area), value) in self.component.iter().zip(&self.areas).zip(field) {
+            sums[c as usize] += *area * *value;
+            areas[c as usize] += area;
+        }
+        self.component.iter().map(|&c| sums[c as usize] / areas[c as usize]).collect()
+    }
+}
+
+/// The share of each vertex in its sample, by area.
+fn shares(mesh: &Mesh, sample: &[u32], count: usize) -> Vec<f64> {
+    let areas = mesh.vertex_areas();
+    let (mut total, mut copies) = (vec![0.0; count], vec![0.0; count]);
+    for (&s, area) in sample.iter().zip(&areas).filter(|(s, _)| **s != NOWHERE) {
+        total[s as usize] += area;
+        copies[s as usize] += 1.0;
+    }
+    let share = |(&s, area): (&u32, &f64)| match s {
+        NOWHERE => 0.0,
+        s if total[s as usize] > 0.0 => area / total[s as usize],
+        s => 1.0 / copies[s as usize],
+    };
+    sample.iter().zip(&areas).map(share).collect()
+}
+
+/// Which connected part each sample belongs to, numbered by their first samples.
+fn components(corners: &[[u32; 3]], count: usize) -> Vec<u32> {
+    fn root(parent: &mut [u32], mut v: u32) -> u32 {
+        while parent[v as usize] != v {
+            parent[v as usize] = parent[parent[v as usize] as usize];
+            v = parent[v as usize];
+        }
+        v
+    }
+    let mut parent: Vec<u32> = (0..count as u32).collect();
+    for &[a, b, c] in corners {
+        for (from, to) in [(a, b), (b, c)] {
+            let (from, to) = (root(&mut parent, from), root(&mut parent, to));
+            parent[from.max(to) as usize] = from.min(to);
+        }
+    }
+    let mut number = vec![0; count];
+    let mut parts = 0;
+    for v in 0..count as u32 {
+        let first = root(&mut parent, v);
+        if first == v {
+            number[v as usize] = parts;
+            parts += 1;
+        } else {
+            number[v as usize] = number[first as usize];
+        }
+    }
+    number
+}
+
+fn assemble(triangles: &Intrinsic, count: usize) -> (CsMat<f64>, Vec<f64>) {
+    let mut areas = vec![0.0; count];
+    let mut entries = TriMat::with_capacity((count, count), 12 * triangles.corners.len());
+    for (t, corners) in triangles.corners.iter().enumerate() {
+        for i in 0..3 {
+            areas[corners[i] as usize] += triangles.area(t) / 3.0;
+            let (a, b) = (corners[i] as usize, corners[(i + 1) % 3] as usize);
+            let weight = 0.5 * triangles.cotangent(3 * t + i);
+            // An edge that returns to where it began costs nothing.
+            if a != b {
+                entries.add_triplet(a, a, weight);
+                entries.add_triplet(b, b, weight);
+                entries.add_triplet(a, b, -weight);
+                entries.add_triplet(b, a, -weight);
+            }
+        }
+    }
+    (entries.to_csc(), areas)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::normals::Normals;
+    use crate::geometry::shapes;
+    use glam::{DAffine3, Vec3};
+
+    fn energy(laplacian: &Laplacian, f: &[f64]) -> f64 {
+        laplacian.stiffness.iter().map(|(w, (i, j))| w * f[i] * f[j]).sum()
+    }
+
+    #[test]
+    fn constants_cost_nothing_and_a_linear_function_its_gradient_squared() {
+        let mesh = shapes::slab(DVec3::new(3.0, 2.0, 1.0), (7, 5));
+        let laplacian = Laplacian::of(&mesh);
+        assert!(energy(&laplacian, &vec![3.0; laplacian.samples()]).abs() < 1e-9);
+        // x over the box: 1 on all faces but the two that look along x.
+        let mut x = vec![0.0; laplacian.samples()];
+        laplacian.sample.iter().zip(&mesh.positions).for_each(|(&s, p)| x[s as usize] = p.x as f64);
+        let expected = 2.0 * (3.0 * 2.0 + 3.0 * 1.0);
+        assert!((energy(&laplacian, &x) / expected - 1.0).abs() < 1e-5, "{}", energy(&laplacian, &x));
+        let area: f64 = laplacian.areas.iter().sum::<f64>() * laplacian.edge * laplacian.edge;
+        assert!((area / 22.0 - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn coordinates_of_a_sphere_have_the_energy_of_their_frequency() {
+        // -div grad x = 2/R² x; the integral of x² over the sphere is 4 pi R^4 / 3. The error falls with the edges squared.
+        let error = |level| {
+            let mesh = shapes::sphere(2.0, level);
+            let laplacian = Laplacian::of(&mesh);
+            let x: Vec<f64> = mesh.positions.iter().map(|p| p.x as f64).collect();
+            (energy(&laplacian, &x) / (2.0 * 4.0 * std::f64::consts::PI * 4.0 / 3.0) - 1.0).abs()
+        };
+        assert!(error(4) < 4e-3 && error(3) / error(4) > 3.5, "{} {}", error(3), error(4));
+    }
+
+    #[test]
+    fn splitting_and_stray_vertices_and_scale_change_nothing() {
+        let mesh = shapes::torus(1.0, 0.4, (24, 12));
+        let base = Laplacian::of(&mesh);
+        let mut split = mesh.clone().with_normals(Normals::Flat);
+        split.positions.push(Vec3::splat(1e9));
+        split.normals.push(Vec3::Y);
+        split.uvs.clear();
+        split.triangles.extend([[0, 0, 1], [2, 2, 2]]);
+        let other = Laplacian::of(&split);
+        assert_eq!(other.samples(), base.samples());
+        assert_eq!(*other.sample.last().unwrap(), NOWHERE);
+        let sorted = |l: &Laplacian| {
+            let mut weights: Vec<f64> = l.stiffness.data().to_vec();
+            weights.sort_by(f64::total_cmp);
+            weights
+        };
+        let close = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9 * (1.0 + a.abs()));
+        assert!(close(&sorted(&base), &sorted(&other)));
+        // No coordinate is so small that it would lose bits.
+        for k in [2f64.powi(-60), 2f64.powi(60)] {
+            let scaled = Laplacian::of(&mesh.transformed(&DAffine3::from_scale(DVec3::splat(k))));
+            assert_eq!(scaled.stiffness, base.stiffness);
+            assert_eq!(scaled.areas, base.areas);
+        }
+    }
+
+    #[test]
+    fn slivers_and_faces_without_area_keep_weights_in_bounds() {
+        let mut mesh = shapes::sphere(1.0, 2);
+        for step in [1e-3, 1e-5, 1e-7] {
+            // Every vertex of the upper half is drawn towards the pole until the triangles there are needles.
+            for p in mesh.positions.iter_mut().filter(|p| p.y > 0.3) {
+                p.x *= step as f32;
+            }
+            let n = mesh.positions.len() as u32;
+            mesh.triangles.extend([[0, 1, n - 1], [0, 1, 0]]);
+            let laplacian = Laplacian::of(&mesh);
+            assert!(laplacian.areas.iter().all(|a| *a > 0.0));
+            let largest = laplacian.stiffness.data().iter().fold(0.0f64, |m, w| m.max(w.abs()));
+            assert!(largest.is_finite() && largest < 1e5, "{largest}");
+            let f: Vec<f64> = (0..laplacian.samples()).map(|i| (7.3 * i as f64).sin()).collect();
+            assert!(energy(&laplacian, &f) > 0.0);
+        }
+    }
+
+    #[test]
+    fn components_are_told_apart_and_each_keeps_its_mean() {
+        let mut mesh = shapes::sphere(1.0, 1);
+        let n = mesh.positions.len() as u32;
+        let far = mesh.transformed(&DAffine3::from_translation(DVec3::X * 5.0));
+        mesh.positions.extend(far.positions);
+        mesh.normals.extend(far.normals);
+        mesh.triangles.extend(far.triangles.iter().map(|t| t.map(|v| v + n)));
+        let laplacian = Laplacian::of(&mesh);
+        let side = |v: u32| laplacian.component[laplacian.sample[v as usize] as usize];
+        assert_eq!((side(0), side(n), laplacian.components()), (0, 1, 2));
+        let field: Vec<DVec3> = (0..2 * n).map(|i| DVec3::splat(if i < n { 1.0 } else { -3.0 })).collect();
+        let means = laplacian.means(&laplacian.at_samples(field.iter().copied()));
+        let mean = |v: u32| means[laplacian.sample[v as usize] as usize];
+        assert!((0..2 * n).all(|v| mean(v).distance(field[v as usize]) < 1e-12));
+    }
+}

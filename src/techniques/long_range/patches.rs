@@ -1,0 +1,287 @@
+//! The surface cut into patches, each of which sends its light as one splat.
+//!
+//! The mesh is decimated, and every vertex belongs to the coarse triangle that lies nearest to it. A triangle of the mesh
+//! belongs to the group of its first vertex: pixels can tell that group, so that what the camera sees of it can be taken
+//! away. A patch is all of a group, but for triangles that are longer than patches should be: those are halved until they
+//! are not [Maisch2020, section 8.1], and each piece is a patch of the same group.
+//!
+//! All of it is baked for the shape at rest, as vertex numbers and barycentric coordinates, and holds however it deforms.
+
+use crate::geometry::mesh::{Mesh, weld};
+use crate::geometry::nearest::Nearest;
+use crate::gpu::{Buffer, Gpu};
+use crate::problem::Problem;
+use crate::store::{Bake, Run, Slot, Step};
+use glam::{DVec3, Vec2, Vec3};
+use meshopt::SimplifyOptions;
+use serde::{Deserialize, Serialize};
+
+/// A piece of one triangle: a point for where it is, and its share of the triangle's area.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Leaf {
+    triangle: u32,
+    /// Weights of the second and third corner.
+    at: Vec2,
+    share: f32,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Patches {
+    /// Patch after patch.
+    leaves: Vec<Leaf>,
+    /// Where each patch's leaves begin; one more for where the last ones end.
+    starts: Vec<u32>,
+    /// Each patch's group.
+    groups: Vec<u32>,
+    /// Each vertex's group.
+    of_vertex: Vec<u32>,
+    group_count: u32,
+}
+
+/// About `wanted` patches of a mesh.
+#[derive(Serialize)]
+pub(super) struct Cut {
+    pub mesh: Slot<Mesh>,
+    pub wanted: u32,
+}
+
+impl Step for Cut {
+    type Output = Patches;
+    fn name(&self) -> &'static str {
+        "long_range.patches"
+    }
+    fn about(&self) -> String {
+        format!("the surface cut into some {} patches", self.wanted)
+    }
+    fn run(&self, run: &Run) -> Result<Patches, Problem> {
+        run.tick(0.0)?;
+        Ok(cut(&run.get(self.mesh), self.wanted))
+    }
+}
+
+impl Bake for Cut {
+    const CODE: &'static [&'static str] = &["src/geometry/", "src/techniques/long_range/patches.rs"];
+}
+
+fn cut(mesh: &Mesh, wanted: u32) -> Patches {
+    let area = mesh.area();
+    if mesh.triangles.is_empty() || area == 0.0 {
+        return Patches { starts: vec![0], ..Patches::default() };
+    }
+    let (of_vertex, group_count) = groups(mesh, wanted);
+    // Twice as long as the side of a square patch.
+    let longest = 2.0 * (area / wanted as f64).sqrt();
+    let mut whole: Vec<Vec<Leaf>> = vec![Vec::new(); group_count as usize];
+    let mut pieces: Vec<(u32, Leaf)> = Vec::new();
+    for (t, triangle) in mesh.triangles.iter().enumerate() {
+        let group = of_vertex[triangle[0] as usize];
+        let corners = mesh.corners(t);
+        let mut leaves = Vec::new();
+        halve(corners, [Vec2::ZERO, Vec2::X, Vec2::Y], 1.0, longest, &mut |at, share| {
+            leaves.push(Leaf { triangle: t as u32, at, share })
+        });
+        match leaves.len() {
+            1 => whole[group as usize].append(&mut leaves),
+            _ => pieces.extend(leaves.into_iter().map(|leaf| (group, leaf))),
+        }
+    }
+    let whole = whole.into_iter().enumerate().map(|(group, leaves)| (group as u32, leaves));
+    let pieces = pieces.into_iter().map(|(group, leaf)| (group, vec![leaf]));
+    let mut patches = Patches { starts: vec![0], of_vertex, group_count, ..Patches::default() };
+    for (group, leaves) in whole.chain(pieces).filter(|(_, leaves)| !leaves.is_empty()) {
+        patches.groups.push(group);
+        patches.leaves.extend(leaves);
+        patches.starts.push(patches.leaves.len() as u32);
+    }
+    patches
+}
+
+/// Each vertex's coarse triangle, numbered as they come, and how many there are.
+fn groups(mesh: &Mesh, wanted: u32) -> (Vec<u32>, u32) {
+    let weld = weld(&mesh.positions);
+    let indices: Vec<u32> = mesh.triangles.iter().flatten().map(|&v| weld[v as usize]).collect();
+    let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| p.to_array()).collect();
+    let options = SimplifyOptions::Regularize | SimplifyOptions::Prune;
+    let coarse = meshopt::simplify_decoder(&indices, &positions, 3 * wanted as usize, 1.0, options, None);
+    let triangles: Vec<[u32; 3]> = coarse.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+    let coarse = Mesh { positions: mesh.positions.clone(), triangles, ..Mesh::default() };
+    let nearest = Nearest::new(&coarse);
+    let mut numbers = vec![u32::MAX; coarse.triangles.len().max(1)];
+    let mut count = 0;
+    let of_vertex = mesh
+        .positions
+        .iter()
+        .map(|p| {
+            // Nothing is left of a mesh that is one flat piece of nothing: it is one group.
+            let triangle = nearest.find(p.as_dvec3(), f64::INFINITY).map_or(0, |closest| closest.triangle as usize);
+            if numbers[triangle] == u32::MAX {
+                numbers[triangle] = count;
+                count += 1;
+            }
+            numbers[triangle]
+        })
+        .collect();
+    (of_vertex, count)
+}
+
+/// Tells middle and share of the pieces of a triangle, none of whose sides is longer than `longest`.
+fn halve(corners: [DVec3; 3], at: [Vec2; 3], share: f32, longest: f64, each: &mut impl FnMut(Vec2, f32)) {
+    let side = |i: usize| corners[i].distance(corners[(i + 1) % 3]);
+    let i = (0..3).fold(0, |best, i| if side(i) > side(best) { i } else { best });
+    // A sliver has no area to speak of, however long it is.
+    let area = (corners[1] - corners[0]).cross(corners[2] - corners[0]).length();
+    if side(i) <= longest || share < 1e-4 || area < 1e-3 * longest * longest {
+        return each((at[0] + at[1] + at[2]) / 3.0, share);
+    }
+    let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+    let (middle, middle_at) = (0.5 * (corners[i] + corners[j]), 0.5 * (at[i] + at[j]));
+    halve([corners[i], middle, corners[k]], [at[i], middle_at, at[k]], 0.5 * share, longest, each);
+    halve([middle, corners[j], corners[k]], [middle_at, at[j], at[k]], 0.5 * share, longest, each);
+}
+
+/// Where the leaves are on the mesh as it is now, with its normals.
+#[derive(Serialize)]
+pub(super) struct LeafPoints {
+    pub mesh: Slot<Mesh>,
+    pub patches: Slot<Patches>,
+}
+
+impl Step for LeafPoints {
+    type Output = Mesh;
+    const NEEDS_HOST: bool = false;
+    fn name(&self) -> &'static str {
+        "geometry.leaves"
+    }
+    fn about(&self) -> String {
+        "a point on each piece of the patches".into()
+    }
+    fn run(&self, run: &Run) -> Result<Mesh, Problem> {
+        let (mesh, patches) = (run.get(self.mesh), run.get(self.patches));
+        let mix = |values: &[Vec3], leaf: &Leaf| {
+            let [a, b, c] = mesh.triangles[leaf.triangle as usize].map(|v| values[v as usize]);
+            a + leaf.at.x * (b - a) + leaf.at.y * (c - a)
+        };
+        Ok(Mesh {
+            positions: patches.leaves.iter().map(|leaf| mix(&mesh.positions, leaf)).collect(),
+            normals: patches.leaves.iter().map(|leaf| mix(&mesh.normals, leaf).normalize_or(Vec3::Y)).collect(),
+            ..Mesh::default()
+        })
+    }
+}
+
+/// A list of the patches, on the device.
+#[derive(Serialize)]
+pub(super) struct UploadPatches {
+    pub patches: Slot<Patches>,
+    pub list: List,
+}
+
+#[derive(Clone, Copy, Serialize)]
+pub(super) enum List {
+    /// Per patch: where its leaves begin and end, and its group.
+    Spans,
+    /// As floats: a vertex stream.
+    OfVertex,
+}
+
+impl Step for UploadPatches {
+    type Output = Buffer;
+    fn name(&self) -> &'static str {
+        "gpu.upload"
+    }
+    fn about(&self) -> String {
+        "patches to the device".into()
+    }
+    fn run(&self, run: &Run) -> Result<Buffer, Problem> {
+        let patches = run.get(self.patches);
+        let gpu: &Gpu = run.host();
+        Ok(match self.list {
+            List::Spans => {
+                let span = |(pair, group): (&[u32], &u32)| [pair[0], pair[1], *group];
+                let spans: Vec<[u32; 3]> = patches.starts.windows(2).zip(&patches.groups).map(span).collect();
+                Buffer::new(gpu, bytemuck::cast_slice(&spans))
+            }
+            List::OfVertex => {
+                let floats: Vec<f32> = patches.of_vertex.iter().map(|&group| group as f32).collect();
+                Buffer::new(gpu, bytemuck::cast_slice(&floats))
+            }
+        })
+    }
+}
+
+/// Areas on the mesh as it is now, on the device: of the leaves, or of whole groups. Object space.
+#[derive(Serialize)]
+pub(super) struct UploadAreas {
+    pub mesh: Slot<Mesh>,
+    pub patches: Slot<Patches>,
+    pub of_groups: bool,
+}
+
+impl Step for UploadAreas {
+    type Output = Buffer;
+    fn name(&self) -> &'static str {
+        "gpu.upload"
+    }
+    fn about(&self) -> String {
+        "areas to the device".into()
+    }
+    fn run(&self, run: &Run) -> Result<Buffer, Problem> {
+        let (mesh, patches) = (run.get(self.mesh), run.get(self.patches));
+        let faces = mesh.face_areas();
+        let areas: Vec<f32> = match self.of_groups {
+            false => patches.leaves.iter().map(|leaf| faces[leaf.triangle as usize] as f32 * leaf.share).collect(),
+            true => {
+                let mut areas = vec![0.0; patches.group_count as usize];
+                for (triangle, area) in mesh.triangles.iter().zip(&faces) {
+                    if let Some(&group) = patches.of_vertex.get(triangle[0] as usize) {
+                        areas[group as usize] += area;
+                    }
+                }
+                areas.into_iter().map(|area: f64| area as f32).collect()
+            }
+        };
+        Ok(Buffer::new(run.host::<Gpu>(), bytemuck::cast_slice(&areas)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::shapes;
+
+    #[test]
+    fn patches_cover_the_surface_once_whatever_its_triangles() {
+        for mesh in [
+            shapes::sphere(2.0, 5),
+            shapes::cuboid(DVec3::new(1.0, 5.0, 0.1)),
+            shapes::torus_knot(2, 3, 2.0, 0.4, (200, 3)),
+            shapes::slab(DVec3::new(4.0, 4.0, 0.2), (30, 30)),
+        ] {
+            let patches = cut(&mesh, 500);
+            assert!((150..3000).contains(&patches.groups.len()), "{} patches", patches.groups.len());
+            assert_eq!(patches.starts.len(), patches.groups.len() + 1);
+            // Each triangle's pieces add up to it, so that areas do, deformed or not.
+            let mut shares = vec![0.0; mesh.triangles.len()];
+            patches.leaves.iter().for_each(|leaf| shares[leaf.triangle as usize] += leaf.share);
+            assert!(shares.iter().all(|share| (share - 1.0f32).abs() < 1e-5));
+            for (patch, group) in patches.groups.iter().enumerate() {
+                let leaves = &patches.leaves[patches.starts[patch] as usize..patches.starts[patch + 1] as usize];
+                let first = |leaf: &Leaf| mesh.triangles[leaf.triangle as usize][0];
+                assert!(leaves.iter().all(|leaf| patches.of_vertex[first(leaf) as usize] == *group));
+            }
+            // No patch is much wider than it should be.
+            let side = (mesh.area() / 500.0).sqrt();
+            for (patch, pair) in patches.starts.windows(2).enumerate() {
+                let leaves = &patches.leaves[pair[0] as usize..pair[1] as usize];
+                let area: f64 =
+                    leaves.iter().map(|leaf| mesh.face_areas()[leaf.triangle as usize] * leaf.share as f64).sum();
+                assert!(area < 30.0 * side * side, "patch {patch} has {:.1} times its area", area / side / side);
+                if patch > 40 {
+                    break;
+                }
+            }
+            assert_eq!(cut(&mesh, 500), patches);
+        }
+        assert_eq!(cut(&Mesh::default(), 100).groups.len(), 0);
+    }
+}
