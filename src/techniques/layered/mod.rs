@@ -26,8 +26,10 @@
 //! `scenes/bench/whisper.ron` shows it. Planes know no other side: what is thin is not lit from behind. Rays through a
 //! rough boundary are bent as by a smooth one.
 //!
-//! Left of the paper: its planes' normals are unit here, with a signed distance; a neighbour counts by its area and not
-//! when it looks the other way; a point behind its plane is unlit; depths follow the fitted plane from the surface on.
+//! Other than in the paper, planes have a unit normal and a signed distance; a neighbour counts by its area, and not when it
+//! looks the other way; a point behind its plane is unlit.
+//!
+//! Not there yet: light that scatters more than once, under the light that scatters once.
 //!
 //! ```
 //! use diaphane::scene::TechniqueText;
