@@ -23,7 +23,8 @@
 //!
 //! Fails where the profile does: light is taken to cross the inside of things as if they were flat and endless, so thin
 //! parts come out too dark, and hollow ones glow. `scenes/long-range/back-lit.ron` shows it against `volume`. Shadows that
-//! are seen through a thing are as coarse as its patches.
+//! are seen through a thing are as coarse as its patches. Of a patch that the picture's rim cuts, what is not seen still lies
+//! at its middle: near enough to a surface that a patch fills the picture, it comes out a tenth too bright.
 //!
 //! ```
 //! use diaphane::scene::TechniqueText;

@@ -1,6 +1,6 @@
 //! The surface cut into patches, each of which sends its light as one splat.
 //!
-//! The mesh is decimated, and every vertex belongs to the coarse triangle that lies nearest to it. A triangle of the mesh
+//! The mesh is decimated, and every vertex belongs to the coarse triangle that lies nearest to it, and to the side it faces. A triangle of the mesh
 //! belongs to the group of its first vertex: pixels can tell that group, so that what the camera sees of it can be taken
 //! away. A patch is all of a group, but for triangles that are longer than patches should be: those are halved until they
 //! are not [Maisch2020, section 8.1], and each piece is a patch of the same group.
@@ -15,6 +15,7 @@ use crate::store::{Bake, Run, Slot, Step};
 use glam::{DVec3, Vec2, Vec3};
 use meshopt::SimplifyOptions;
 use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
 
 /// A piece of one triangle: a point for where it is, and its share of the triangle's area.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -96,7 +97,7 @@ fn cut(mesh: &Mesh, wanted: u32) -> Patches {
     patches
 }
 
-/// Each vertex's coarse triangle, numbered as they come, and how many there are.
+/// Each vertex's coarse triangle and the side that it faces, numbered as they come, and how many there are.
 fn groups(mesh: &Mesh, wanted: u32) -> (Vec<u32>, u32) {
     let weld = weld(&mesh.positions);
     let indices: Vec<u32> = mesh.triangles.iter().flatten().map(|&v| weld[v as usize]).collect();
@@ -106,22 +107,22 @@ fn groups(mesh: &Mesh, wanted: u32) -> (Vec<u32>, u32) {
     let triangles: Vec<[u32; 3]> = coarse.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
     let coarse = Mesh { positions: mesh.positions.clone(), triangles, ..Mesh::default() };
     let nearest = Nearest::new(&coarse);
-    let mut numbers = vec![u32::MAX; coarse.triangles.len().max(1)];
-    let mut count = 0;
+    // Vertices at one place may belong to several sides of an edge, and those to several of a thin sheet: what is seen of
+    // one side says nothing of the other.
+    let side = |normal: Vec3| (normal.abs().max_position(), normal[normal.abs().max_position()] < 0.0);
+    let mut numbers = HashMap::new();
     let of_vertex = mesh
         .positions
         .iter()
-        .map(|p| {
-            // Nothing is left of a mesh that is one flat piece of nothing: it is one group.
-            let triangle = nearest.find(p.as_dvec3(), f64::INFINITY).map_or(0, |closest| closest.triangle as usize);
-            if numbers[triangle] == u32::MAX {
-                numbers[triangle] = count;
-                count += 1;
-            }
-            numbers[triangle]
+        .zip(&mesh.normals)
+        .map(|(p, normal)| {
+            // A mesh of which nothing is left is one group.
+            let triangle = nearest.find(p.as_dvec3(), f64::INFINITY).map_or(0, |closest| closest.triangle);
+            let next = numbers.len() as u32;
+            *numbers.entry((triangle, side(*normal))).or_insert(next)
         })
         .collect();
-    (of_vertex, count)
+    (of_vertex, numbers.len() as u32)
 }
 
 /// Tells middle and share of the pieces of a triangle, none of whose sides is longer than `longest`.
