@@ -23,7 +23,7 @@ const SMALL: usize = 700;
 /// Pairs that a band is meant to have, and columns of a block: an eigenvalue repeated more often is found all the same,
 /// with more steps.
 const BAND: f64 = 80.0;
-const BLOCK: usize = 4;
+const BLOCK: usize = 8;
 
 /// Eigenvalues nearer to each other than this, relative to themselves, count as one repeated.
 const REPEATED: f64 = 1e-5;
@@ -204,6 +204,7 @@ impl Slicer<'_> {
                     return self.accept(basis, &vectors, &inside, &inverse, shift, to, &space);
                 }
                 if is_whole || space.is_full() {
+                    eprintln!("n {n} from {from} to {to} count {count} inside {} size {size} most {most} whole {is_whole} worst {:e} largest {:e} known {known_count}", inside.len(), inside.iter().map(|&k| left(k) / inverse[k].abs()).fold(0.0, f64::max), largest);
                     return Ok(None);
                 }
             }
@@ -234,6 +235,7 @@ impl Slicer<'_> {
             let image = space.laplacian_of(column);
             let residual: Vec<f64> = image.iter().zip(column).map(|(image, v)| image - value * v).collect();
             if length(&residual) > RESIDUAL * to {
+                eprintln!("residual {:e} of {:e} at {value}", length(&residual), to);
                 return Ok(None);
             }
             lambda.push(value);
