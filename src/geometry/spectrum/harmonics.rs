@@ -180,16 +180,18 @@ impl Slicer<'_> {
                     projected[(c, r)] = *value;
                 }
             }
+            // Nothing new, or no room for it.
             let is_whole = space.size == range.end;
             let size = range.end - first;
-            if size * 2 >= 3 * count || is_whole || space.is_full() {
+            if size * 2 >= 3 * count || is_whole {
                 tick((size as f64 / most as f64).min(1.0))?;
                 let (inverse, vectors) = eigen(projected.as_ref().submatrix(first, first, size, size))?;
                 // A Ritz vector's residual is what its last block leaves behind.
                 let left = |k: usize| {
                     let tail = splits.iter().enumerate().map(|(c, split)| {
                         let outside: f64 = split.inside.iter().skip(range.end).map(|v| v * v).sum::<f64>()
-                            + split.new.map_or(0.0, |(_, length)| length * length);
+                            + split.new.map_or(0.0, |(_, length)| length * length)
+                            + split.lost * split.lost;
                         vectors[(range.start - first + c, k)].abs() * outside.sqrt()
                     });
                     tail.sum::<f64>()
@@ -199,11 +201,11 @@ impl Slicer<'_> {
                     .collect();
                 let largest = inverse.iter().fold(0.0f64, |most, v| most.max(v.abs()));
                 let converged = inside.iter().all(|&k| left(k) < 1e-9 * inverse[k].abs() + 1e-13 * largest);
-                if inside.len() == count && (converged || is_whole) {
+                if inside.len() == count && converged {
                     let basis = space.columns().subcols(first, size);
                     return self.accept(basis, &vectors, &inside, &inverse, shift, to, &space);
                 }
-                if is_whole || space.is_full() {
+                if is_whole {
                     eprintln!("n {n} from {from} to {to} count {count} inside {} size {size} most {most} whole {is_whole} worst {:e} largest {:e} known {known_count}", inside.len(), inside.iter().map(|&k| left(k) / inverse[k].abs()).fold(0.0, f64::max), largest);
                     return Ok(None);
                 }

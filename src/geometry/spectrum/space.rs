@@ -21,6 +21,8 @@ pub(super) struct Space<'a> {
 pub(super) struct Split {
     pub inside: Vec<f64>,
     pub new: Option<(usize, f64)>,
+    /// The length of what found no room, or was too short to be new.
+    pub lost: f64,
 }
 
 impl<'a> Space<'a> {
@@ -83,7 +85,8 @@ impl<'a> Space<'a> {
                 self.size += 1;
                 (self.size - 1, after)
             });
-            splits.push(Split { inside: coordinates, new });
+            let lost = if new.is_none() { after } else { 0.0 };
+            splits.push(Split { inside: coordinates, new, lost });
         }
         splits
     }
