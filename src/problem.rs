@@ -3,7 +3,9 @@
 //! A [`Problem`] is one thing that is wrong; [`Problems`] is what a reader hands back, since errors of meaning are
 //! reported all at once. Warnings are problems too, of [`Severity::Warning`]: the picture will come, and disappoint.
 
+use std::borrow::Cow;
 use std::fmt;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// A place in a text file, 1-based, with the line itself, so that the message can show it after the file has changed.
@@ -12,54 +14,58 @@ pub struct At {
     pub file: PathBuf,
     pub line: usize,
     pub column: usize,
-    /// The whole source line, without its end.
+    /// What is shown of the source line, without its end: all of one that somebody wrote, the surroundings of the value in
+    /// one that a program did.
     pub source: String,
-    /// How many characters of that line the offending value takes, at least 1.
+    /// Where in that the value begins, 1-based.
+    pub mark: usize,
+    /// How many characters of it the value takes, at least 1.
     pub width: usize,
 }
 
 impl At {
     /// The place of the bytes `span` in `text`, which is the content of `file`.
-    pub fn span(file: &Path, text: &str, span: std::ops::Range<usize>) -> At {
+    pub fn span(file: &Path, text: &str, span: Range<usize>) -> At {
         let mut start = span.start.min(text.len());
         while !text.is_char_boundary(start) {
             start -= 1;
         }
         let line_start = text[..start].rfind('\n').map_or(0, |i| i + 1);
         let line_end = text[start..].find('\n').map_or(text.len(), |i| start + i);
-        let mut end = span.end.clamp(start, line_end.max(start));
+        let mut end = span.end.clamp(start, line_end);
         while !text.is_char_boundary(end) {
             end -= 1;
         }
-        At {
-            file: file.to_path_buf(),
-            line: text[..start].matches('\n').count() + 1,
-            column: text[line_start..start].chars().count() + 1,
-            source: text[line_start..line_end].trim_end_matches('\r').to_string(),
-            width: text[start..end].chars().count().max(1),
-        }
+        let number = text[..start].matches('\n').count() + 1;
+        At::in_line(file, number, &text[line_start..line_end], start - line_start..end - line_start)
     }
 
-    /// The part of the line that is shown, and where in it the value begins, 1-based, and how long it is: all of a line
-    /// that somebody wrote, the surroundings of the value in one that a program did.
-    fn excerpt(&self) -> (String, usize, usize) {
+    /// The place of the bytes `span` in the line of that number.
+    pub fn in_line(file: &Path, number: usize, line: &str, span: Range<usize>) -> At {
         const WHOLE: usize = 200;
         const BEFORE: usize = 40;
         const SHOWN: usize = 120;
-        if self.source.chars().count() <= WHOLE {
-            return (self.source.clone(), self.column, self.width);
-        }
-        let skipped = (self.column - 1).saturating_sub(BEFORE);
-        let rest: String = self.source.chars().skip(skipped).take(SHOWN).collect();
-        let lead = if skipped > 0 { "…" } else { "" };
-        let tail = if self.source.chars().count() > skipped + SHOWN { "…" } else { "" };
-        let column = self.column - skipped + lead.chars().count();
-        (format!("{lead}{rest}{tail}"), column, self.width.min(SHOWN - BEFORE))
+        let column = line[..span.start].chars().count() + 1;
+        let width = line[span].chars().count().max(1);
+        let line = line.trim_end_matches('\r');
+        let length = line.chars().count();
+        let (source, mark, width) = match length <= WHOLE {
+            true => (line.to_string(), column, width),
+            false => {
+                let skipped = (column - 1).saturating_sub(BEFORE);
+                let shown: String = line.chars().skip(skipped).take(SHOWN).collect();
+                let lead = if skipped > 0 { "…" } else { "" };
+                let tail = if length > skipped + SHOWN { "…" } else { "" };
+                let mark = column - skipped + lead.chars().count();
+                (format!("{lead}{shown}{tail}"), mark, width.min(SHOWN - BEFORE))
+            }
+        };
+        At { file: file.to_path_buf(), line: number, column, source, mark, width }
     }
 
     /// A file as a whole (an image, a mesh): no line.
     pub fn file(file: &Path) -> At {
-        At { file: file.to_path_buf(), line: 0, column: 0, source: String::new(), width: 1 }
+        At { file: file.to_path_buf(), line: 0, column: 0, source: String::new(), mark: 0, width: 1 }
     }
 }
 
@@ -169,27 +175,36 @@ impl fmt::Display for Problem {
         }
         write!(f, "{}: ", if self.is_error() { "error" } else { "warning" })?;
         if let Some(path) = &self.path {
-            write!(f, "{path}: ")?;
+            write!(f, "{}: ", clipped(path))?;
         }
-        write!(f, "{}", self.what)?;
+        write!(f, "{}", clipped(&self.what))?;
         if let Some(at) = self.at.as_ref().filter(|at| at.line > 0) {
             let number = at.line.to_string();
             let margin = " ".repeat(number.len());
-            let (shown, column, width) = at.excerpt();
             // A tab stays a tab, so that the marks stand under their value.
-            let lead: String = shown.chars().take(column - 1).map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
-            write!(f, "\n{margin} |\n{number} | {shown}\n{margin} | {lead}{}", "^".repeat(width))?;
+            let lead: String =
+                at.source.chars().take(at.mark.saturating_sub(1)).map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
+            write!(f, "\n{margin} |\n{number} | {}\n{margin} | {lead}{}", at.source, "^".repeat(at.width))?;
             if let Some(hint) = &self.hint {
-                write!(f, "\n{margin} = hint: {hint}")?;
+                write!(f, "\n{margin} = hint: {}", clipped(hint))?;
             }
         } else if let Some(hint) = &self.hint {
-            write!(f, "\n  hint: {hint}")?;
+            write!(f, "\n  hint: {}", clipped(hint))?;
         }
         Ok(())
     }
 }
 
 impl std::error::Error for Problem {}
+
+/// As much of a text as anybody reads: a file may hold a name of any length.
+fn clipped(text: &str) -> Cow<'_, str> {
+    const READ: usize = 1500;
+    match text.char_indices().nth(READ) {
+        Some((end, _)) => format!("{}…", &text[..end]).into(),
+        None => text.into(),
+    }
+}
 
 /// All that is wrong with what was read, in the order of the files; never empty when it is an `Err`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -228,9 +243,15 @@ pub fn counted(number: usize, thing: &str) -> String {
 
 /// The word in `known` that `word` was probably meant to be.
 pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    // To compare two words takes time and memory in proportion to both, and a file may name anything.
+    const LONGEST: usize = 256;
+    if word.len() > LONGEST {
+        return None;
+    }
     let lower = word.to_lowercase();
     known
         .into_iter()
+        .filter(|k| k.len() <= LONGEST)
         .map(|k| (strsim::damerau_levenshtein(&lower, &k.to_lowercase()), k))
         .filter(|(distance, k)| *distance <= 1 + k.len().min(word.len()) / 3 && *distance < k.len().max(word.len()))
         .min_by_key(|(distance, _)| *distance)
@@ -254,6 +275,15 @@ mod tests {
         let marks = lines[3].iter().position(|c| *c == '^').unwrap();
         assert_eq!(lines[2][marks..marks + 4], ['O', 'O', 'P', 'S']);
         assert!(lines[2][4] == '…' && lines[2].ends_with(&['…']));
+    }
+
+    #[test]
+    fn names_of_any_length_are_told_and_compared_at_once() {
+        let name = "n".repeat(10_000_000);
+        let problem = Problem::files(format!("there is no `{name}`")).path(&name).hint(format!("not {name}"));
+        assert!(problem.to_string().len() < 5000 && problem.to_string().contains("there is no `nnn"));
+        assert_eq!(nearest(&name, ["n", &name]), None);
+        assert_eq!(nearest("nn", ["n", &name]), Some("n"));
     }
 
     #[test]

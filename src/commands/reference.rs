@@ -7,6 +7,7 @@ use crate::reference::{self, volume::Light};
 use crate::session::{Goal, Options, whole};
 use crate::store::{Key, Origin};
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -241,7 +242,8 @@ impl Merge {
         let tiles: Vec<Tile> = self.tiles.iter().map(|file| Tile::read(file)).collect::<Result<_, Problem>>()?;
         let (first, file) = (&tiles[0], &self.tiles[0]);
         let mut picture = Image::filled(first.image.width, first.image.height, [f32::NAN; 3]);
-        let mut there = vec![None; first.of as usize];
+        // As many as a tile says there are need not fit into memory.
+        let mut there = BTreeMap::new();
         for (tile, path) in tiles.iter().zip(&self.tiles) {
             let same = tile.of == first.of
                 && tile.text == first.text
@@ -252,7 +254,7 @@ impl Merge {
                     .at(At::file(path))
                     .hint("merge tiles of one scene, size, seed and --spp"));
             }
-            if let Some(twin) = there[tile.place as usize - 1].replace(path) {
+            if let Some(twin) = there.insert(tile.place, path) {
                 let what = format!("tile {}/{} is there twice: {} too", tile.place, tile.of, twin.display());
                 return Err(Problem::files(what).at(At::file(path)).hint("name each tile once"));
             }
@@ -261,8 +263,8 @@ impl Merge {
                 picture.pixels[y * width..][..width].copy_from_slice(&tile.image.pixels[y * width..][..width]);
             }
         }
-        if let Some(missing) = there.iter().position(Option::is_none) {
-            let what = format!("tile {}/{} is missing", missing + 1, first.of);
+        if let Some(missing) = (1..=first.of).find(|place| !there.contains_key(place)) {
+            let what = format!("tile {missing}/{} is missing", first.of);
             return Err(words(what, "name all tiles"));
         }
         let text: Vec<(&str, &str)> = first.text.iter().map(|(key, value)| (key.as_str(), value.as_str())).collect();

@@ -29,6 +29,8 @@ pub fn read_obj(bytes: &[u8], path: &Path) -> Result<(Mesh, Vec<Problem>), Probl
     if bytes.contains(&0) {
         return Err(whole(path, "this is binary data, not OBJ text").hint("export the mesh as Wavefront OBJ"));
     }
+    // Some editors begin a text with a mark of its encoding, which would hide the first vertex and shift all others.
+    let bytes = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes);
     let mut checked = Checked::default();
     // Faces may name what comes after them.
     for (_, line) in lines(bytes) {
@@ -38,7 +40,7 @@ pub fn read_obj(bytes: &[u8], path: &Path) -> Result<(Mesh, Vec<Problem>), Probl
         }
     }
     for (number, line) in lines(bytes) {
-        checked.add(number, &line).map_err(|fault| fault.problem(path, number, &line))?;
+        checked.add(number, &line).map_err(|fault| fault.problem(path, bytes, number, &line))?;
     }
     if checked.faces.is_empty() {
         let what = if checked.totals[0] == 0 { "there is no mesh in this file" } else { "there are no faces" };
@@ -82,21 +84,17 @@ struct Fault {
 }
 
 impl Fault {
-    fn problem(self, path: &Path, number: usize, line: &str) -> Problem {
-        // Lines that no one could read in a terminal are not shown.
-        const LONGEST: usize = 200;
+    /// `line` begins as the line `number` of `bytes`, and may go on in those after it.
+    fn problem(self, path: &Path, bytes: &[u8], number: usize, line: &str) -> Problem {
         let word = line.split_whitespace().nth(self.word).unwrap_or(&line[..0]);
-        let start = word.as_ptr() as usize - line.as_ptr() as usize;
-        let column = line[..start].chars().count() + 1;
-        let readable = line.chars().count() <= LONGEST;
-        let at = At {
-            file: path.to_path_buf(),
-            line: number,
-            column,
-            source: if readable { line.trim_end().to_string() } else { String::new() },
-            width: if readable { word.chars().count().max(1) } else { 1 },
-        };
-        Problem::files(self.what).at(at).hint(self.hint)
+        let mut start = word.as_ptr() as usize - line.as_ptr() as usize;
+        let mut own = bytes.split(|&b| b == b'\n').map(String::from_utf8_lossy).zip(1..).skip(number - 1);
+        let (mut text, mut number) = own.next().expect("the line is one of them");
+        while let Some(head) = text.trim_end().strip_suffix('\\').map(str::len).filter(|&head| start > head) {
+            start -= head + 1;
+            (text, number) = own.next().expect("the word stands in one of them");
+        }
+        Problem::files(self.what).at(At::in_line(path, number, &text, start..start + word.len())).hint(self.hint)
     }
 }
 

@@ -19,6 +19,8 @@ pub fn triangulate(corners: &[DVec3]) -> Option<Vec<[usize; 3]>> {
     let flat = flatten(corners);
     let mut left: Vec<usize> = (0..corners.len()).collect();
     let mut triangles = Vec::with_capacity(corners.len() - 2);
+    // How many corners may still be looked at. A polygon that crosses itself everywhere would take the cube of its corners.
+    let mut patience = 16 * corners.len() * corners.len();
     while left.len() > 3 {
         let n = left.len();
         let around = |i: usize| [left[(i + n - 1) % n], left[i], left[(i + 1) % n]];
@@ -31,11 +33,14 @@ pub fn triangulate(corners: &[DVec3]) -> Option<Vec<[usize; 3]>> {
         };
         // Quads decide by one diagonal; large polygons take the first good enough ear, to stay quadratic.
         let candidates = (0..n).map(|i| (i, quality(i)));
-        let ear = if n <= 8 {
+        let ear = if patience == 0 {
+            None
+        } else if n <= 8 {
             candidates.reduce(|best, one| if one.1 > best.1 { one } else { best })
         } else {
             candidates.take(n).find(|one| one.1 >= 0.0)
         };
+        patience = patience.saturating_sub(n * ear.map_or(n, |(i, _)| i + 1));
         let ear = ear.map_or(1, |(i, _)| i);
         triangles.push(around(ear));
         left.remove(ear);
@@ -108,6 +113,9 @@ mod tests {
             assert!((net - newell).abs() < 1e-12 && (gross - newell).abs() < 1e-12, "{net} {gross} {newell}");
         }
         assert_eq!(triangulate(&star(400)), None);
+        // One that crosses itself everywhere.
+        let wild: Vec<DVec3> = (0..512).map(|i| star(256)[i * 211 % 512]).collect();
+        assert_eq!(triangulate(&wild).unwrap().len(), 510);
     }
 
     proptest! {

@@ -12,22 +12,32 @@ use ::exr::prelude::{
 use super::read::{MAX_BYTES, Refused, refuse_size};
 use super::{Image, Texture};
 
+/// What a byte of a file unpacks to at most: DEFLATE makes 1032 bytes of one, and PXR24 four of three.
+const MAX_BYTES_PER_BYTE: u64 = 1376;
+/// A block of a small file may be this large: that of a small picture in a large tile.
+const USUAL_BLOCK: u64 = 8 << 20;
+
 /// Reads R, G, B and A of the file's first layer, or Y in place of R, G and B.
 pub(super) fn decode(bytes: &[u8]) -> Result<Texture, Refused> {
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(refused)?;
     for header in &meta.headers {
         let Vec2(width, height) = header.layer_size;
-        refuse_size(width as u64, height as u64)?;
-        // Blocks are unpacked whole, with all channels of the layer, wanted or not.
-        let block = match header.blocks {
-            BlockDescription::ScanLines => width * header.compression.scan_lines_per_block().min(height),
-            BlockDescription::Tiles(tiles) => tiles.tile_size.0.min(width) * tiles.tile_size.1.min(height),
+        refuse_size(width as u64, height as u64, bytes.len())?;
+        let all = (width * height).saturating_mul(header.channels.bytes_per_pixel) as u64;
+        if all > MAX_BYTES_PER_BYTE * bytes.len() as u64 {
+            return Err(Refused::damaged(&format!("{} bytes cannot hold {all} bytes of pixels", bytes.len())));
+        }
+        // Blocks are unpacked whole, with all channels of the layer, wanted or not; a tile may be larger than the picture.
+        let (across, down) = match header.blocks {
+            BlockDescription::ScanLines => (width, header.compression.scan_lines_per_block()),
+            BlockDescription::Tiles(tiles) => (tiles.tile_size.0, tiles.tile_size.1),
         };
-        let unpacked = block as u64 * header.channels.bytes_per_pixel as u64;
-        if unpacked > MAX_BYTES {
+        let unpacked = across.saturating_mul(down).saturating_mul(header.channels.bytes_per_pixel) as u64;
+        let limit = USUAL_BLOCK.max(MAX_BYTES_PER_BYTE * bytes.len() as u64).min(MAX_BYTES);
+        if unpacked > limit {
             return Err(Refused::new(
-                format!("one block of its pixels unpacks to {unpacked} bytes; {MAX_BYTES} is the limit"),
-                "save it with fewer channels, or in scan lines",
+                format!("one block of its pixels unpacks to {unpacked} bytes; {limit} is the limit"),
+                "save it with fewer channels, in smaller tiles or in scan lines",
             ));
         }
     }

@@ -16,6 +16,8 @@ use crate::problem::{At, Problem};
 pub const MAX_SIDE: u64 = 16_384;
 /// The most memory that a texture may take: 2^26 texels of 16 bytes, 1 GiB.
 pub const MAX_BYTES: u64 = 1 << 30;
+/// What a byte of a file unpacks to at most, in pixels. One-bit PNG goes furthest: DEFLATE makes 1032 bytes of one.
+const MAX_PIXELS_PER_BYTE: u64 = 8 * 1032;
 
 const BYTES_PER_TEXEL: u64 = size_of::<[f32; 4]>() as u64;
 
@@ -65,8 +67,9 @@ impl From<::image::ImageError> for Refused {
     }
 }
 
-/// Refuses an image without pixels, and one that would take too much memory.
-pub(super) fn refuse_size(width: u64, height: u64) -> Result<(), Refused> {
+/// Refuses an image without pixels, one that would take too much memory, and one that says more than its `length` bytes
+/// can hold: a small file takes little memory, whatever it says.
+pub(super) fn refuse_size(width: u64, height: u64, length: usize) -> Result<(), Refused> {
     if width == 0 || height == 0 {
         return Err(Refused::new(format!("the image is {width} x {height} pixels: empty"), "write it again"));
     }
@@ -80,6 +83,9 @@ pub(super) fn refuse_size(width: u64, height: u64) -> Result<(), Refused> {
             ),
         ));
     }
+    if width * height > MAX_PIXELS_PER_BYTE * length as u64 {
+        return Err(Refused::damaged(&format!("{length} bytes cannot hold {width} x {height} pixels")));
+    }
     Ok(())
 }
 
@@ -88,12 +94,12 @@ fn decode_trusting(bytes: &[u8], encoding: Encoding) -> Result<Texture, Refused>
     match ::image::guess_format(bytes) {
         Ok(ImageFormat::OpenExr) => exr::decode(bytes),
         // The size is checked as soon as the header is read; the decoder's own limits bound what it needs besides.
-        Ok(ImageFormat::Png) => pixels(PngDecoder::with_limits(source, limits())?, encoding),
+        Ok(ImageFormat::Png) => pixels(PngDecoder::with_limits(source, limits())?, encoding, bytes),
         Ok(ImageFormat::Jpeg) if !is_complete_jpeg(bytes) => Err(Refused::damaged(&"it has no end marker")),
-        Ok(ImageFormat::Jpeg) => pixels(JpegDecoder::new(source)?, encoding),
-        Ok(ImageFormat::Hdr) => pixels(HdrDecoder::new(source)?, Encoding::Linear),
+        Ok(ImageFormat::Jpeg) => pixels(JpegDecoder::new(source)?, encoding, bytes),
+        Ok(ImageFormat::Hdr) => pixels(HdrDecoder::new(source)?, Encoding::Linear, bytes),
         // The signature that Radiance itself writes today differs from the one that the strict reader insists on.
-        Err(_) if bytes.starts_with(b"#?RGBE") => pixels(HdrDecoder::new_nonstrict(source)?, Encoding::Linear),
+        Err(_) if bytes.starts_with(b"#?RGBE") => pixels(HdrDecoder::new_nonstrict(source)?, Encoding::Linear, bytes),
         Err(_) if bytes.is_empty() => Err(Refused::new("the file is empty", "write it again")),
         Ok(other) => Err(not_read(&format!("a {other:?} file"))),
         Err(_) => Err(not_read("no image known here")),
@@ -113,9 +119,10 @@ fn limits() -> Limits {
     limits
 }
 
-fn pixels(decoder: impl ImageDecoder, encoding: Encoding) -> Result<Texture, Refused> {
+/// What `decoder` makes of `bytes`.
+fn pixels(decoder: impl ImageDecoder, encoding: Encoding, bytes: &[u8]) -> Result<Texture, Refused> {
     let (width, height) = decoder.dimensions();
-    refuse_size(u64::from(width), u64::from(height))?;
+    refuse_size(u64::from(width), u64::from(height), bytes.len())?;
     let texels = match DynamicImage::from_decoder(decoder)? {
         float @ (DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)) => {
             float.into_rgba32f().pixels().map(|pixel| pixel.0).collect()

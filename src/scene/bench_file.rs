@@ -124,7 +124,7 @@ fn techniques(count: usize, judge: &mut Judge<'_>) -> Vec<TechniqueText> {
                 judge.wrong(&path, format!("{} stands here twice", text.ron), "take one of them away")
             }
             Ok(text) => found.push(text),
-            Err(problem) => judge.problems.push(problem),
+            Err(problem) => judge.add(problem),
         }
     }
     found

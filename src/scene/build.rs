@@ -325,7 +325,7 @@ fn segments(path: &str, (along, around): (u32, u32), (least, most): (u32, u32), 
 }
 
 fn technique(path: &str, judge: &mut Judge<'_>) -> Option<TechniqueText> {
-    TechniqueText::of(judge.node(path), path).map_err(|problem| judge.problems.push(problem)).ok()
+    TechniqueText::of(judge.node(path), path).map_err(|problem| judge.add(problem)).ok()
 }
 
 fn view(file: &SceneFile, judge: &mut Judge<'_>) -> Option<ViewSettings> {

@@ -217,8 +217,9 @@ pub fn material(files: &Files, file: &File, fits: &dyn Fn(&Node) -> Result<(), P
             _ => typed::<String>(&base, "base")?,
         };
         let next = named(files, &base, &name).map_err(|e| e.path("base"))?;
-        let same = |path: &PathBuf| shown(path) == shown(&next.path);
-        if chain.iter().any(same) {
+        // The same file, whatever links lead to it.
+        let real = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| shown(path));
+        if chain.iter().any(|path| real(path) == real(&next.path)) {
             chain.push(next.path.clone());
             let shown: Vec<String> = chain.iter().map(|p| shown(p).display().to_string()).collect();
             return Err(Problem::files("a material cannot inherit from itself")

@@ -19,6 +19,9 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+/// What scatters light in nature has a handful; what each comes to takes milliseconds to find out.
+const MAX_LAYERS: usize = 64;
+
 /// A valid material. Two are equal when nothing that is rendered from them can differ.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Material {
@@ -202,7 +205,7 @@ pub fn build(file: &MaterialFile, reader: &Reader, judge: &mut Judge<'_>) -> Opt
 /// A mean free path so short that its coefficients are no numbers any more.
 fn dense_enough(path: &str, substance: Substance, judge: &mut Judge<'_>) -> Option<Substance> {
     match &substance {
-        Substance::Translucent(m) if !(m.sigma_t().is_finite() && m.g.is_finite()) => {
+        Substance::Translucent(m) if !(m.sigma_t() + m.sigma_tr() + m.g).is_finite() => {
             judge.wrong(path, "this medium is too dense to compute with", "a longer mean free path: it is in mm");
             None
         }
@@ -236,6 +239,11 @@ fn layer_name(i: usize) -> String {
 
 /// Where each layer ends; `None` where that is wrong.
 fn depths(file: &MaterialFile, reader: &Reader, judge: &mut Judge<'_>) -> Vec<Option<Varying<f64>>> {
+    if file.layers.len() > MAX_LAYERS {
+        let what = format!("{} layers are too many", file.layers.len());
+        judge.wrong("layers", what, format!("at most {MAX_LAYERS}"));
+        return Vec::new();
+    }
     let mut names = BTreeSet::new();
     let mut deepest: Option<f64> = None;
     let mut out = Vec::new();

@@ -3,7 +3,7 @@
 //! Messages write them, `--set` reads them. A member of a list goes by its number or by its `name:`.
 
 use crate::problem::{Problem, nearest};
-use crate::scene::tree::{Field, Node, Source, Value};
+use crate::scene::tree::{Field, MAX_DEPTH, Node, Source, Value};
 use std::fmt::Write;
 use std::ops::Range;
 use std::path::Path;
@@ -183,8 +183,13 @@ impl Node {
     pub fn set_from_flag(&mut self, path: &str, ron: &str, dir: &Path) -> Result<(), Problem> {
         let source = Source::of_flag("--set", dir, format!("{path}={ron}"));
         let flag = Flag { source: source.clone(), path: 0..path.len() };
+        let steps = steps(path);
+        // As with brackets in a text: who walks the tree goes as deep as it is.
+        if steps.len() > MAX_DEPTH {
+            return Err(flag.problem(format!("the path has more than {MAX_DEPTH} members")));
+        }
         let value = Node::parse(&source, path.len() + 1).map_err(|e| e.problem(&source).path(path))?;
-        self.set(&steps(path), &mut String::new(), value, &flag)
+        self.set(&steps, &mut String::new(), value, &flag)
     }
 }
 
@@ -294,6 +299,8 @@ mod tests {
             assert_eq!(set.get("objects.bunny.name").unwrap().text(), "\"bunny\"");
             assert_eq!(set.get("eye.0").unwrap().text(), "1");
         }
+        let deep = format!("eye{}", ".x".repeat(100_000));
+        assert!(tree("Scene()").set_from_flag(&deep, "1", Path::new("")).unwrap_err().what.contains("64 members"));
         let error = tree(SCENE).set_from_flag("objects.bunni.mesh", "1", Path::new("")).unwrap_err();
         assert_eq!(
             error.to_string(),

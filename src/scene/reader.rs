@@ -14,7 +14,7 @@ use crate::store::{File, Files, Key};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 /// A mesh or an image stays remembered for this many reads after the last that named it, so that undoing an edit is free.
 const KEPT_READS: u64 = 16;
@@ -25,6 +25,7 @@ pub struct Reader {
     meshes: Memory<Key, ReadMesh>,
     textures: Memory<(Key, Encoding), ReadTexture>,
     materials: Mutex<BTreeMap<PathBuf, Option<Arc<Material>>>>,
+    default_material: OnceLock<Arc<Material>>,
 }
 
 #[derive(Clone)]
@@ -43,7 +44,8 @@ struct ReadTexture {
 
 impl Reader {
     pub fn new(files: Arc<Files>) -> Reader {
-        Reader { files, meshes: Memory::new(), textures: Memory::new(), materials: Mutex::default() }
+        let (meshes, textures) = (Memory::new(), Memory::new());
+        Reader { files, meshes, textures, materials: Mutex::default(), default_material: OnceLock::new() }
     }
 
     /// A scene with all that it names, and the warnings. `sets` are pairs of PATH and RON.
@@ -157,7 +159,7 @@ impl Reader {
     }
 
     pub(super) fn default_material(&self) -> Arc<Material> {
-        Arc::new(build::default_material(self))
+        self.default_material.get_or_init(|| Arc::new(build::default_material(self))).clone()
     }
 
     /// The material of an object; its problems are told once, however many objects share it.
@@ -174,11 +176,11 @@ impl Reader {
         }
         let material = match self.material_of(&file) {
             Ok((material, problems)) => {
-                judge.problems.extend(problems);
+                problems.into_iter().for_each(|problem| judge.add(problem));
                 material.map(Arc::new)
             }
             Err(problem) => {
-                judge.problems.push(match has_line(&problem) {
+                judge.add(match has_line(&problem) {
                     true => problem,
                     false => at_its_name(problem, judge.node(path)).path(path),
                 });

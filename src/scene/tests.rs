@@ -250,9 +250,52 @@ fn a_file_with_a_hundred_thousand_mistakes_is_told_the_first() {
         [many("(name: \"\"),"), many("(transform: (scale: NaN)),"), many("(name: \"a\", material: \"no.ron\"),")]
     {
         let Problems(problems) = scene(&text).unwrap_err();
-        assert!(problems.len() > 50 && problems.len() < 200);
+        assert!(problems.len() > 50 && problems.len() <= 200);
     }
+    let skies = format!("Scene(version: 1, mm_per_unit: 1, lights: [{}])", "Environment(),".repeat(100_000));
+    assert_eq!(scene(&skies).unwrap_err().0.len(), 100);
     assert_eq!(scene(&many("(name: \"a\", visible: 3),")).unwrap_err().0.len(), 1);
+}
+
+#[test]
+fn a_material_has_a_few_layers() {
+    let of = |layers: usize| {
+        let layer = |i| format!("(depth: {i}, medium: Color()),");
+        format!("Material(version: 1, layers: [{}])", (0..layers).map(layer).collect::<String>())
+    };
+    assert_eq!(material(&of(64)).unwrap().0.layers.len(), 64);
+    assert!(show(&material(&of(65)).unwrap_err().0).contains("at most 64"));
+}
+
+#[test]
+#[cfg(unix)]
+fn a_circle_of_bases_is_seen_through_links_and_what_only_looks_like_one_is_not() {
+    let dir = tempfile::tempdir().unwrap();
+    let [one, two] = ["one", "two"].map(|name| dir.path().join(name));
+    [&one, &two].into_iter().for_each(|folder| std::fs::create_dir(folder).unwrap());
+    std::os::unix::fs::symlink(".", one.join("here")).unwrap();
+    std::os::unix::fs::symlink(&two, one.join("there")).unwrap();
+    let write = |path: PathBuf, base: &str| {
+        std::fs::write(&path, format!("Material(version: 1, base: \"{base}\")")).unwrap();
+        path
+    };
+    let Problems(problems) = reader().material(&write(one.join("a.ron"), "here/a.ron")).unwrap_err();
+    assert!(problems[0].what.contains("inherit from itself"), "{problems:?}");
+    // `there/..` is the folder of both, not `one`.
+    let first = write(one.join("b.ron"), "there/../b.ron");
+    std::fs::write(dir.path().join("b.ron"), "Material(version: 1, surface: (ior: 1.7))").unwrap();
+    assert_eq!(reader().material(&first).unwrap().0.surface.ior, 1.7);
+}
+
+/// Every bare object is worth two warnings.
+#[test]
+fn warnings_neither_hide_an_error_nor_are_one() {
+    let bare = |more: &str| format!("Scene(version: 1, mm_per_unit: 1, objects: [{}{more}])", "(),".repeat(20_000));
+    let (scene_read, warnings) = scene(&bare("")).unwrap();
+    assert_eq!((scene_read.objects.len(), warnings.len()), (20_000, 100));
+    assert!(Arc::ptr_eq(&scene_read.objects[0].material, &scene_read.objects[1].material));
+    let Problems(problems) = scene(&bare("(transform: (scale: 0))")).unwrap_err();
+    assert!(problems.iter().any(|p| p.is_error() && p.path.as_deref() == Some("objects[20000].transform.scale")));
 }
 
 /// Files of which every part is well spelled.

@@ -1,6 +1,7 @@
 //! Bakes on disk: one file each, named by the bake's key, written aside and renamed.
 //!
-//! A file is a header (magic, format, name of the step, length, checksum of key and content) and the content. Whatever
+//! A file is a header (magic, format, lengths, checksum of all that follows and of the key), the name of the
+//! step and the content. Whatever
 //! does not fit its header is not a value: it is reported once, removed and made again. So nothing need be flushed to the
 //! disk, and processes that share a folder need no lock: they write the same bytes under the same name.
 //!
@@ -16,7 +17,7 @@ use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, SystemTime};
 
 const MAGIC: &[u8; 8] = b"diaphane";
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 /// magic 8, format 4, length of the step's name 4, length of the content 8, checksum 32
 const HEADER: usize = 56;
 
@@ -323,7 +324,9 @@ fn hex(text: &str) -> Option<Vec<u8>> {
 }
 
 fn checksum(key: &[u8; 32], step: &[u8], content: &[u8]) -> [u8; 32] {
-    *blake3::Hasher::new().update(key).update(step).update(content).finalize().as_bytes()
+    // With the name's length, or a byte at its end could as well be the content's first.
+    let length = (step.len() as u64).to_le_bytes();
+    *blake3::Hasher::new().update(key).update(&length).update(step).update(content).finalize().as_bytes()
 }
 
 /// The step's name and the content, or why the bytes are no bake of that key.

@@ -46,6 +46,8 @@ fn tiles_merge_into_the_bits_of_one_run() {
     merge(&["tile1.exr", "tile2.exr"]).fails(2, &["tile 3/3 is missing"]);
     merge(&["tile1.exr", "tile2.exr", "tile2.exr"]).fails(1, &["there twice"]);
     merge(&["tile1.exr", "whole.exr"]).fails(1, &["whole.exr", "no tile"]);
+    trace("far.exr", &["--tile", "1/4294967295"]).ok();
+    merge(&["far.exr"]).fails(2, &["tile 2/4294967295 is missing"]);
     trace("seed.exr", &["--tile", "3/3", "--seed", "5"]).ok();
     merge(&["tile1.exr", "tile2.exr", "seed.exr"]).fails(1, &["another picture"]);
     assert!(!desk.path("merged.exr").exists());

@@ -192,6 +192,23 @@ fn a_huge_size_is_refused_with_both_numbers_before_memory_is_asked_for() {
 }
 
 #[test]
+fn a_small_file_that_says_it_is_a_large_picture_is_refused() {
+    for (name, bytes, _) in &*SAMPLES {
+        let said = refusal(&with_size(name, bytes, 8192, 8192));
+        assert!(said.contains("bytes cannot hold"), "{name}: {said}");
+    }
+    // As far as a format goes, nothing is refused that it can hold.
+    let mut blank = Vec::new();
+    let mut encoder = ::png::Encoder::new(&mut blank, 2048, 2048);
+    encoder.set_color(::png::ColorType::Grayscale);
+    encoder.set_depth(::png::BitDepth::One);
+    encoder.set_compression(::png::Compression::High);
+    encoder.write_header().unwrap().write_image_data(&vec![0; 2048 * 2048 / 8]).unwrap();
+    assert!(blank.len() < 4096, "{}", blank.len());
+    read(&blank).unwrap();
+}
+
+#[test]
 fn a_file_cut_short_anywhere_is_refused() {
     for (name, bytes, spare) in &*SAMPLES {
         for length in 0..bytes.len() - spare {
