@@ -34,7 +34,15 @@ pub const PAPERS: &[Paper] = &[
         "Doi1991",
         "A. Doi & A. Koide. An Efficient Method of Triangulating Equi-Valued Surfaces by Using Tetrahedral Cells. IEICE E74, 1991",
     ),
+    paper(
+        "Donner2005",
+        "C. Donner & H. W. Jensen. Light Diffusion in Multi-Layered Translucent Materials. SIGGRAPH 2005",
+    ),
     paper("Dupuy2023", "J. Dupuy & A. Benyoub. Sampling Visible GGX Normals with Spherical Caps. CGF 42(8), 2023"),
+    paper(
+        "Edelsbrunner1990",
+        "H. Edelsbrunner & E. Mücke. Simulation of Simplicity: A Technique to Cope with Degenerate Cases. ACM TOG 9(1), 1990",
+    ),
     paper(
         "Felzenszwalb2012",
         "P. Felzenszwalb & D. Huttenlocher. Distance Transforms of Sampled Functions. Theory of Computing 8(19), 2012",

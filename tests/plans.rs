@@ -330,3 +330,61 @@ fn undoing_an_edit_finds_all_that_was_there() {
     }
     assert_eq!(Desk::new(BALL).plan(&[]).keys().collect::<Vec<_>>(), before, "another folder with the same content");
 }
+
+/// A plan of the ball with another technique, after edits of the scene and of its material.
+fn with_technique(technique: &str, sets: &[(&str, &str)], ball: &str) -> Plan {
+    let all: Vec<(&str, &str)> = [("view.technique", technique)].into_iter().chain(sets.iter().copied()).collect();
+    Desk::new(ball).plan(&all)
+}
+
+#[test]
+fn thickness_is_baked_of_shapes_and_what_it_leaves_of_light_of_media() {
+    const LENGTHS: &str = "thickness.lengths";
+    const LEFT: &str = "thickness.transmittance";
+    let is_bake = |name: &&str| name.starts_with("thickness.");
+    for technique in ["SphericalThickness()", "SphericalThickness(encode: Thickness, attenuation: Beer)"] {
+        let before = with_technique(technique, &[], BALL);
+        let baked = |sets: &[(&str, &str)], ball: &str| {
+            let made = made_anew(&before, &with_technique(technique, sets, ball));
+            assert!(made.contains_key("frame.image"), "{technique} {sets:?}");
+            made.into_keys().filter(is_bake).collect::<Vec<_>>()
+        };
+        assert!(before.steps().iter().any(|step| step.name == LENGTHS && step.is_bake()));
+        for (path, ron) in [
+            ("lights.sun.irradiance", "3"),
+            ("lights.sun.direction", "(0, -1, 1)"),
+            ("lights.lamp.position", "(3, 4, -3)"),
+            ("lights.room.radiance", "3"),
+            ("lights.room.rotation_deg", "10"),
+            ("camera.eye", "(0.1, 2, 8)"),
+            ("objects.ball.transform.translate", "(0.2, 1, 0)"),
+            ("objects.ball.transform.rotate_deg", "(10, 20, 30)"),
+        ] {
+            assert_eq!(baked(&[(path, ron)], BALL), Vec::<&str>::new(), "{technique}: {path}");
+        }
+        let edit = |says: &str, then: &str| {
+            assert!(BALL.contains(says));
+            baked(&[], &BALL.replace(says, then))
+        };
+        assert_eq!(edit("color: (1, 1, 1)", "color: (1, 1, 0.9)"), Vec::<&str>::new());
+        assert_eq!(edit("roughness: 0.3", "roughness: 0.4"), Vec::<&str>::new());
+        assert_eq!(edit("sigma_a: (0.02, 0.03, 0.05)", "sigma_a: (0.02, 0.03, 0.06)"), [LEFT]);
+        let shape = baked(&[("objects.ball.transform.scale", "1.1")], BALL);
+        assert!(shape.contains(&LENGTHS) && shape.contains(&LEFT), "{shape:?}");
+    }
+    // What the response does not read is not in its name.
+    let linear = "SphericalThickness(attenuation: Linear, max_thickness: 9)";
+    let denser = BALL.replace("sigma_a: (0.02, 0.03, 0.05)", "sigma_a: (0.02, 0.03, 0.06)");
+    let made = made_anew(&with_technique(linear, &[], BALL), &with_technique(linear, &[], &denser));
+    assert!(!made.keys().any(|name| is_bake(name)), "{made:?}");
+}
+
+#[test]
+fn lamps_in_front_of_a_thing_ask_for_fewer_coefficients() {
+    let said = |direction: &str| {
+        let plan = with_technique("SphericalThickness()", &[("lights.sun.direction", direction)], BALL);
+        let found = plan.steps().iter().find(|step| step.name.ends_with(".through") && step.about.contains("`sun`"));
+        found.expect("the sun sends light through the ball").about.clone()
+    };
+    assert!(said("(0, -0.2, -1)").ends_with("4 coefficients") && said("(0, -0.2, 1)").ends_with("25 coefficients"));
+}

@@ -96,6 +96,17 @@ fn twins() -> Vec<Twin> {
             floor: 1.0,
             mistake: ("0.4886025119029199 * x", "-0.4886025119029199 * x"),
         },
+        Twin {
+            stem: "sh",
+            name: "sh_basis_8",
+            axes: vec![directions(), directions(), directions()],
+            rust: Box::new(|a| sh::sh_basis_8(a[0], a[1], a[2]).to_vec()),
+            results: 64,
+            // Off the sphere, as here, high bands are large numbers.
+            tolerance: 1e-5,
+            floor: 1.0,
+            mistake: ("z * value - before / step_before", "z * value - before / step"),
+        },
     ]
 }
 

@@ -10,7 +10,7 @@ use crate::gpu::{Bind, Cover, Depth, Draw, Format, Images, Layer, Raster, Sample
 use crate::problem::{Problem, counted};
 use crate::scene::{Light, LightKind};
 use crate::store::{Plan, Slot};
-use glam::{DMat4, DVec3, DVec4};
+use glam::{DAffine3, DMat4, DVec3, DVec4};
 
 const DIRECTIONAL: u32 = 0;
 const POINT: u32 = 1;
@@ -23,17 +23,17 @@ const POINT_SIZE: u32 = 1024;
 const RECT_SIZE: u32 = 512;
 
 /// A view from a light. World space.
-struct LightView {
-    clip_from_world: DMat4,
+pub(super) struct LightView {
+    pub clip_from_world: DMat4,
     /// The width of a texel: in the world for a directional light, else at unit depth.
-    texel: f64,
+    pub texel: f64,
 }
 
 /// The views of one light.
-struct LightViews {
-    views: Vec<LightView>,
-    per_sample: u32,
-    size: u32,
+pub(super) struct LightViews {
+    pub views: Vec<LightView>,
+    pub per_sample: u32,
+    pub size: u32,
 }
 
 impl Frame<'_> {
@@ -51,7 +51,7 @@ impl Frame<'_> {
         self.scene.lights.iter().enumerate().filter(|(_, light)| shines(light)).collect()
     }
 
-    fn casts(light: &Light) -> bool {
+    pub(super) fn casts(light: &Light) -> bool {
         light.shadow
     }
 
@@ -75,23 +75,7 @@ impl Frame<'_> {
     }
 
     fn row_of(&self, light: &Light, visibility: i32) -> tables::Light {
-        let eye = self.view.camera.eye;
-        let (kind, position, power, u, v) = match light.kind {
-            LightKind::Directional { direction, irradiance } => {
-                (DIRECTIONAL, -direction, irradiance, DVec3::ZERO, DVec3::ZERO)
-            }
-            LightKind::Point { position, intensity } => (POINT, position - eye, intensity, DVec3::ZERO, DVec3::ZERO),
-            LightKind::Rect { center, u, v, radiance } => (RECT, center - eye, radiance, u, v),
-            LightKind::Environment { .. } => unreachable!("the surroundings are no lamp"),
-        };
-        tables::Light {
-            position: position.as_vec3(),
-            kind,
-            power: power.as_vec3(),
-            visibility,
-            u: u.as_vec3(),
-            v: v.as_vec3(),
-        }
+        row_in(light, visibility, &DAffine3::from_translation(-self.view.camera.eye))
     }
 
     /// How much of each lamp that casts shadows every pixel sees: an array of layers. None when no lamp does.
@@ -113,7 +97,7 @@ impl Frame<'_> {
                 continue;
             }
             let views = self.views(light);
-            let shadow_map = self.shadow_map(plan, *i, light, &views)?;
+            let shadow_map = self.shadow_map(plan, *i, light, &views, None)?;
             let eye = DMat4::from_translation(self.view.camera.eye);
             let table: Vec<tables::ShadowView> = views
                 .views
@@ -157,17 +141,19 @@ impl Frame<'_> {
     }
 
     /// Depth from each of the light's views. Everything visible casts, in view of the camera or not, but for the light
-    /// itself.
-    fn shadow_map(
+    /// itself and the item `but`.
+    pub(super) fn shadow_map(
         &self,
         plan: &mut Plan,
         place: usize,
         light: &Light,
         views: &LightViews,
+        but: Option<&Item>,
     ) -> Result<Slot<Images>, Problem> {
         // Planned once: an area light has up to 96 views of them.
         let casters: Vec<(&Item, Draw)> = self
             .casters(place)
+            .filter(|item| but.is_none_or(|but| !std::ptr::eq(*item, but)))
             .map(|item| {
                 let streams = vec![upload::stream(plan, item.mesh, Stream::Positions)];
                 (item, Draw { streams, indices: upload::stream(plan, item.mesh, Stream::Indices), instance: 0 })
@@ -204,20 +190,27 @@ impl Frame<'_> {
         }))
     }
 
-    fn casters(&self, light: usize) -> impl Iterator<Item = &Item> {
+    pub(super) fn casters(&self, light: usize) -> impl Iterator<Item = &Item> {
         self.items.iter().filter(move |item| item.thing != Thing::Light(light))
     }
 
-    fn views(&self, light: &Light) -> LightViews {
+    pub(super) fn views(&self, light: &Light) -> LightViews {
         let place = self.scene.lights.iter().position(|other| std::ptr::eq(other, light)).unwrap_or(usize::MAX);
         let corners: Vec<DVec3> = self.casters(place).flat_map(|item| item.corners).collect();
+        LightViews::of(light, &corners)
+    }
+}
+
+impl LightViews {
+    /// Those of a light that see all of the corners.
+    pub fn of(light: &Light, corners: &[DVec3]) -> LightViews {
         match light.kind {
             LightKind::Directional { direction, .. } => LightViews {
-                views: vec![directional_view(direction, &corners, DIRECTIONAL_SIZE)],
+                views: vec![directional_view(direction, corners, DIRECTIONAL_SIZE)],
                 per_sample: 1,
                 size: DIRECTIONAL_SIZE,
             },
-            LightKind::Point { position, .. } => views_from(&[position], &corners, POINT_SIZE),
+            LightKind::Point { position, .. } => views_from(&[position], corners, POINT_SIZE),
             LightKind::Rect { center, u, v, .. } => {
                 let samples: Vec<DVec3> = (0..16)
                     .map(|i| {
@@ -225,15 +218,36 @@ impl Frame<'_> {
                         center + at(i & 3) * u + at(i >> 2) * v
                     })
                     .collect();
-                views_from(&samples, &corners, RECT_SIZE)
+                views_from(&samples, corners, RECT_SIZE)
             }
             LightKind::Environment { .. } => unreachable!("the surroundings are no lamp"),
         }
     }
 }
 
+/// A lamp's row, in another space than the world.
+pub(super) fn row_in(light: &Light, visibility: i32, from_world: &DAffine3) -> tables::Light {
+    let (place, way) = (|p| from_world.transform_point3(p), |d| from_world.transform_vector3(d));
+    let (kind, position, power, u, v) = match light.kind {
+        LightKind::Directional { direction, irradiance } => {
+            (DIRECTIONAL, way(-direction), irradiance, DVec3::ZERO, DVec3::ZERO)
+        }
+        LightKind::Point { position, intensity } => (POINT, place(position), intensity, DVec3::ZERO, DVec3::ZERO),
+        LightKind::Rect { center, u, v, radiance } => (RECT, place(center), radiance, way(u), way(v)),
+        LightKind::Environment { .. } => unreachable!("the surroundings are no lamp"),
+    };
+    tables::Light {
+        position: position.as_vec3(),
+        kind,
+        power: power.as_vec3(),
+        visibility,
+        u: u.as_vec3(),
+        v: v.as_vec3(),
+    }
+}
+
 /// Whether a box lies wholly outside a view.
-fn is_outside(corners: &[DVec3; 8], clip_from_world: &DMat4) -> bool {
+pub(super) fn is_outside(corners: &[DVec3; 8], clip_from_world: &DMat4) -> bool {
     let clip = corners.map(|p| *clip_from_world * p.extend(1.0));
     let out = |beyond: fn(&DVec4) -> bool| clip.iter().all(beyond);
     out(|p| p.x < -p.w) || out(|p| p.x > p.w) || out(|p| p.y < -p.w) || out(|p| p.y > p.w) || out(|p| p.w < 0.0)

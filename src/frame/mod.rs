@@ -14,6 +14,7 @@
 
 mod compose;
 mod gloss;
+mod lamp;
 mod lights;
 mod sky;
 mod surface;
@@ -22,6 +23,7 @@ mod upload;
 
 pub use crate::scene::Part;
 pub(crate) use compose::{display, read_back};
+pub use lamp::{Lamp, LampViews};
 pub use surface::{Member, Surface};
 
 use crate::geometry::mesh::Mesh;
@@ -379,6 +381,12 @@ fn scatter(material: &Material) -> DVec3 {
 pub fn extent(object: &Object) -> f64 {
     let (min, max) = shape::bounds(object);
     (max - min).max_element()
+}
+
+/// The diagonal of that box.
+fn diagonal(object: &Object) -> f64 {
+    let (min, max) = shape::bounds(object);
+    min.distance(max)
 }
 
 /// A ball in which an object certainly lies: its centre in the world, and its radius, scene units.

@@ -52,6 +52,11 @@ impl<'a> Surface<'a> {
         self.frame.object(self.item(member)).map_or(0.0, super::extent)
     }
 
+    /// The diagonal of that box, scene units.
+    pub fn diagonal(&self, member: &Member) -> f64 {
+        self.frame.object(self.item(member)).map_or(0.0, super::diagonal)
+    }
+
     pub fn shader(&self, name: &str, flags: &[&str]) -> Result<Shader, Problem> {
         self.frame.shaders.load(name, flags)
     }
@@ -101,6 +106,16 @@ impl<'a> Surface<'a> {
         self.frame.sky_irradiance(plan, self.item(member), normals)
     }
 
+    /// The mesh's positions, as a vertex stream.
+    pub fn positions(&self, plan: &mut Plan, member: &Member) -> Slot<Buffer> {
+        upload::stream(plan, member.mesh, upload::Stream::Positions)
+    }
+
+    /// Whether steps that can hardly change the picture are left out.
+    pub fn skips(&self) -> bool {
+        self.frame.view.skip
+    }
+
     /// The mesh's own normals, as a vertex stream.
     pub fn normals(&self, plan: &mut Plan, member: &Member) -> Slot<Buffer> {
         upload::stream(plan, member.mesh, upload::Stream::Normals)
@@ -122,7 +137,12 @@ impl<'a> Surface<'a> {
         }
     }
 
-    fn item(&self, member: &Member) -> &'a Item {
+    /// Several pictures of which each is 0 where the others' objects are.
+    pub fn merge(&self, plan: &mut Plan, pictures: &[Slot<Images>]) -> Result<Option<Slot<Images>>, Problem> {
+        self.frame.merge(plan, pictures)
+    }
+
+    pub(super) fn item(&self, member: &Member) -> &'a Item {
         &self.frame.items[member.place]
     }
 }

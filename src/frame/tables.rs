@@ -61,6 +61,13 @@ uniform! {
 }
 
 uniform! {
+    pub struct OthersView {
+        pub clip_from_object: Mat4,
+        pub per_sample: u32,
+    }
+}
+
+uniform! {
     pub struct Views {
         pub light: u32,
         pub per_sample: u32,
@@ -142,8 +149,9 @@ mod tests {
         macro_rules! layouts {
             ($($name:ident),*) => { vec![$(of::<$name>(stringify!($name))),*] };
         }
-        let ours =
-            layouts![Camera, Object, Light, Caster, ShadowView, Views, Vertices, Direction, Sky, Resolve, Display];
+        let ours = layouts![
+            Camera, Object, Light, Caster, ShadowView, OthersView, Views, Vertices, Direction, Sky, Resolve, Display
+        ];
         let declared = include_str!("tables.rs").matches("uniform! {").count() - 1; // this line is one more
         assert_eq!(ours.len(), declared, "a struct is missing in the list above");
         let theirs = in_shaders();

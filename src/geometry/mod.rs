@@ -14,4 +14,5 @@ pub mod obj;
 mod polygon;
 pub mod sculpture;
 pub mod shapes;
+pub mod thickness;
 pub mod visibility;

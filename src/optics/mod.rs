@@ -14,6 +14,7 @@
 //! | [`phase`] | where a scattered photon goes |
 //! | [`profile`] | how far from where it entered light leaves: dipoles, photon beams, normalised diffusion |
 //! | [`sh`] | real spherical harmonics and what convolution does to them |
+//! | [`slab`] | how much light comes out behind a slab |
 //! | [`quadrature`] | Gauss-Legendre rules, plain and graded towards a singular end, and a double exponential one |
 
 pub mod fresnel;
@@ -26,6 +27,7 @@ pub mod profile;
 pub mod quadrature;
 mod root;
 pub mod sh;
+pub mod slab;
 
 /// One value per channel, linear Rec.709; arithmetic is channel by channel.
 pub type Rgb = glam::DVec3;
@@ -47,7 +49,7 @@ mod tests {
         for (source, functions) in [
             (include_str!("../../shaders/optics/fresnel.wgsl"), &["fresnel_dielectric"][..]),
             (include_str!("../../shaders/optics/microfacet.wgsl"), &["ggx_d", "smith_g2", "ggx_lobe"]),
-            (include_str!("../../shaders/optics/sh.wgsl"), &["sh_basis_3"]),
+            (include_str!("../../shaders/optics/sh.wgsl"), &["sh_basis_3", "sh_basis_8"]),
         ] {
             let module = validate(source).unwrap_or_else(|e| panic!("{e}"));
             let found: Vec<_> = module.functions.iter().filter_map(|(_, f)| f.name.as_deref()).collect();

@@ -56,6 +56,11 @@ pub fn sh_basis_3(x: f64, y: f64, z: f64) -> [f64; 9] {
     ]
 }
 
+/// The 64 harmonics of bands 0 to 7 at the unit direction (x, y, z). Twin: `sh.wgsl`.
+pub fn sh_basis_8(x: f64, y: f64, z: f64) -> [f64; 64] {
+    sh_basis(DVec3::new(x, y, z), 8).try_into().expect("eight bands are 64 harmonics")
+}
+
 /// Coefficients of band l that convolution with the zonal function `f` multiplies with: 2 pi ∫ f(z) P_l(z) dz, for each
 /// l < bands. `rule` are the (node, weight) over z that the integral takes, split where `f` is not smooth.
 pub fn convolution_coefficients(bands: usize, rule: &[(f64, f64)], f: impl Fn(f64) -> f64) -> Vec<f64> {

@@ -4,17 +4,22 @@
 //! scattered and came out again, linear, without gloss, without the surface's colour, 0 where the objects are not. Its
 //! module's header is its manual, and `diaphane techniques NAME` prints it.
 
+mod attenuation;
+mod depth_map_thickness;
 mod filtered_normals;
 mod local;
 mod opaque;
 pub mod reference;
+mod spherical_thickness;
 
 use crate::frame::Surface;
 use crate::gpu::Images;
 use crate::problem::Problem;
 use crate::scene::{Material, TechniqueText};
 use crate::store::{Plan, Slot};
+use depth_map_thickness::DepthMapThickness;
 use reference::Reference;
+use spherical_thickness::SphericalThickness;
 
 /// Radiance per pixel, `rgba32float`, at the sampled size.
 pub type Scattered = Slot<Images>;
@@ -65,6 +70,37 @@ pub const REGISTRY: &[Entry] = &[
     entry!(opaque, Opaque),
     entry!(filtered_normals, FilteredNormals),
     Entry {
+        name: "SphericalThickness",
+        manual: include_str!("spherical_thickness/mod.rs"),
+        sweep: &[
+            "SphericalThickness(bands: 2)",
+            "SphericalThickness(bands: 3)",
+            "SphericalThickness(bands: 4)",
+            "SphericalThickness(bands: 6)",
+            "SphericalThickness(bands: 7)",
+            "SphericalThickness(bands: 8)",
+            "SphericalThickness(front_bands: 5)",
+            "SphericalThickness(encode: Thickness)",
+            "SphericalThickness(attenuation: Beer)",
+            "SphericalThickness(attenuation: Beer, encode: Thickness)",
+            "SphericalThickness(attenuation: Linear)",
+            "SphericalThickness(attenuation: Linear, encode: Thickness, terms: Paper)",
+            "SphericalThickness(window: 1)",
+        ],
+        read: SphericalThickness::read,
+    },
+    Entry {
+        name: "DepthMapThickness",
+        manual: include_str!("depth_map_thickness/mod.rs"),
+        sweep: &[
+            "DepthMapThickness(blur: 0.5)",
+            "DepthMapThickness(blur: 2)",
+            "DepthMapThickness(attenuation: Beer)",
+            "DepthMapThickness(attenuation: Linear, terms: Paper)",
+        ],
+        read: DepthMapThickness::read,
+    },
+    Entry {
         name: Reference::NAME,
         manual: include_str!("reference.rs"),
         sweep: &[],
@@ -74,9 +110,7 @@ pub const REGISTRY: &[Entry] = &[
 ];
 
 /// Techniques that a scene may name one day.
-const LATER: [&str; 11] = [
-    "SphericalThickness",
-    "DepthMapThickness",
+const LATER: [&str; 9] = [
     "PrecomputedTransfer",
     "LongRange",
     "ScreenSpace",
@@ -152,6 +186,23 @@ mod tests {
                 let text = TechniqueText::from_flag("--technique", setting).unwrap();
                 assert!(read(&text).is_ok() && text.name == entry.name, "{setting}");
             }
+        }
+    }
+
+    #[test]
+    fn numbers_that_mean_nothing_are_told_at_their_place() {
+        for (ron, path) in [
+            ("SphericalThickness(bands: 9)", "bands"),
+            ("SphericalThickness(front_bands: 0)", "front_bands"),
+            ("SphericalThickness(max_thickness: 0)", "max_thickness"),
+            ("SphericalThickness(window: -1)", "window"),
+            ("DepthMapThickness(blur: -1)", "blur"),
+            ("DepthMapThickness(max_thickness: -3)", "max_thickness"),
+        ] {
+            let text = TechniqueText::from_flag("--technique", ron).unwrap();
+            let problem = read(&text).err().unwrap_or_else(|| panic!("{ron} is read"));
+            assert_eq!(problem.path.as_deref(), Some(path), "{ron}: {problem}");
+            assert!(problem.at.is_some_and(|at| at.column > ron.find(path).unwrap()) && problem.hint.is_some());
         }
     }
 

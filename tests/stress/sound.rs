@@ -9,13 +9,15 @@ use half::f16;
 use std::collections::HashSet;
 
 /// Steps that make something else than light, by the beginning of their names: what they make may be negative.
-const SIGNED: [(&str, &str); 6] = [
+const SIGNED: [(&str, &str); 8] = [
     ("geometry.", "positions and normals"),
     ("filtered_normals.", "normals"),
     ("frame.gbuffer", "positions"),
     ("frame.openness", "spherical harmonics of what is open"),
     ("frame.through", "a depth: where a ray leaves less where it enters"),
     ("sky.light", "directions, beside the light from there"),
+    ("sky.harmonics", "spherical harmonics of light"),
+    ("thickness.", "spherical harmonics"),
 ];
 
 /// Steps whose halves stand for whatever is brighter, too: a sun in a sky's image.

@@ -5,6 +5,7 @@
 //! normal a technique hands over, so that editing the sky, the material or the normals casts no ray. What deforms sees the
 //! whole sky and hides none of it: `explain` says so.
 
+mod harmonics;
 mod light;
 mod mirror;
 
