@@ -376,7 +376,7 @@ fn thickness_is_baked_of_shapes_and_what_it_leaves_of_light_of_media() {
     let linear = "SphericalThickness(attenuation: Linear, max_thickness: 9)";
     let denser = BALL.replace("sigma_a: (0.02, 0.03, 0.05)", "sigma_a: (0.02, 0.03, 0.06)");
     let made = made_anew(&with_technique(linear, &[], BALL), &with_technique(linear, &[], &denser));
-    assert!(!made.keys().any(|name| is_bake(name)), "{made:?}");
+    assert!(!made.keys().any(is_bake), "{made:?}");
 }
 
 #[test]

@@ -5,7 +5,7 @@ mod studio;
 
 use diaphane::gpu::{Bind, Buffer, Compute, Gpu, Shaders};
 use diaphane::image::{Display, Format, Tone};
-use diaphane::optics::{fresnel, microfacet, sh};
+use diaphane::optics::{fresnel, microfacet, phase, sh};
 use diaphane::render::{self, Look};
 use diaphane::store::{Key, Plan, Store};
 use std::collections::BTreeSet;
@@ -37,6 +37,10 @@ fn cosines() -> Vec<f64> {
 
 fn roughnesses() -> Vec<f64> {
     vec![0.03, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 1.0]
+}
+
+fn parameters() -> Vec<f64> {
+    vec![-0.99, -0.6, -0.1, 0.0, 0.25, 0.4, 0.8, 0.99]
 }
 
 fn directions() -> Vec<f64> {
@@ -106,6 +110,27 @@ fn twins() -> Vec<Twin> {
             tolerance: 1e-5,
             floor: 1.0,
             mistake: ("z * value - before / step_before", "z * value - before / step"),
+        },
+        Twin {
+            stem: "phase",
+            name: "henyey_greenstein",
+            axes: vec![directions(), parameters()],
+            rust: Box::new(|a| vec![phase::henyey_greenstein(a[0], a[1])]),
+            results: 1,
+            // The peak of 0.99 is as sharp as what f32 knows of 1 - g.
+            tolerance: 2e-5,
+            floor: 1e-3,
+            mistake: ("sign(g) * cos", "-sign(g) * cos"),
+        },
+        Twin {
+            stem: "phase",
+            name: "schlick",
+            axes: vec![directions(), parameters()],
+            rust: Box::new(|a| vec![phase::schlick(a[0], a[1])]),
+            results: 1,
+            tolerance: 2e-5,
+            floor: 1e-3,
+            mistake: ("(q * q)", "(q * sqrt(q))"),
         },
     ]
 }

@@ -8,6 +8,7 @@ mod compare;
 mod doctor;
 mod explain;
 mod help;
+mod layers;
 mod look;
 mod media;
 mod new;
@@ -70,6 +71,7 @@ enum Command {
     Bake(bake::Bake),
     Compare(compare::Compare),
     Bench(bench::Bench),
+    Layers(layers::Layers),
     #[command(subcommand)]
     Media(media::Media),
     #[command(subcommand)]
@@ -212,6 +214,7 @@ impl Words {
             Some(Command::Reference(command)) => command.run(options)?,
             Some(Command::Compare(command)) => command.run(options)?,
             Some(Command::Bench(command)) => command.run(options)?,
+            Some(Command::Layers(command)) => command.run()?,
             Some(Command::Media(command)) => command.run(options)?,
             Some(Command::Techniques(command)) => command.run()?,
             Some(Command::Cache(command)) => command.run(options)?,

@@ -7,7 +7,6 @@ use crate::image::Texture;
 use crate::problem::{Problem, counted};
 use crate::scene::{AsNumber, Material, TextureMap, Varying};
 use crate::store::{Key, Plan, Run, Slot, Step};
-use glam::Vec3;
 use half::f16;
 use serde::Serialize;
 
@@ -27,6 +26,13 @@ pub struct Member<'a> {
     pub material: &'a Material,
     /// Object space, scaled: scene units.
     pub mesh: Slot<Mesh>,
+}
+
+impl Member<'_> {
+    /// Its place in the table of [`Surface::objects`].
+    pub fn place(&self) -> usize {
+        self.place
+    }
 }
 
 impl<'a> Surface<'a> {
@@ -121,8 +127,24 @@ impl<'a> Surface<'a> {
         upload::stream(plan, member.mesh, upload::Stream::Normals)
     }
 
+    /// The surroundings as 16 lamps far away, a list of `SkyLamp`: where each is, how far it spreads, and its irradiance on a
+    /// plane that faces it. None when there are no surroundings.
+    pub fn sky_lamps(&self, plan: &mut Plan) -> Option<Bind> {
+        self.frame.sky_lamps(plan).map(Bind::Buffer)
+    }
+
+    /// Which share of each of these lamps reaches each vertex of a member: four vertex streams of `vec4f`.
+    pub fn sky_shares(&self, plan: &mut Plan, member: &Member) -> Result<Vec<Slot<Buffer>>, Problem> {
+        self.frame.sky_shares(plan, self.item(member))
+    }
+
+    /// How many things the table of [`Surface::objects`] has.
+    pub fn places(&self) -> usize {
+        self.frame.items.len()
+    }
+
     /// A vector per vertex, as a vertex stream.
-    pub fn upload(&self, plan: &mut Plan, vectors: Slot<Vec<Vec3>>) -> Slot<Buffer> {
+    pub fn upload<T: bytemuck::Pod + Send + Sync>(&self, plan: &mut Plan, vectors: Slot<Vec<T>>) -> Slot<Buffer> {
         upload::list(plan, vectors, "a vector per vertex")
     }
 

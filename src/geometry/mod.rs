@@ -6,13 +6,16 @@
 pub mod bvh;
 pub mod clearance;
 pub mod deform;
+pub mod depth_map;
 pub mod mesh;
 pub mod nearest;
 pub mod neighbours;
 pub mod normals;
 pub mod obj;
+pub mod plane_fit;
 mod polygon;
 pub mod sculpture;
 pub mod shapes;
+pub mod tangents;
 pub mod thickness;
 pub mod visibility;

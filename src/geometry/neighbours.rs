@@ -184,19 +184,19 @@ impl Samples {
 }
 
 /// Points sorted by the cubic cell that holds them, x fastest, so that three neighbouring cells in x are one range.
-struct Grid {
-    order: Vec<u32>,
-    cells: Vec<Cell>,
+pub(super) struct Grid {
+    pub(super) order: Vec<u32>,
+    pub(super) cells: Vec<Cell>,
 }
 
-struct Cell {
-    key: [u64; 3],
-    start: usize,
-    end: usize,
+pub(super) struct Cell {
+    pub(super) key: [u64; 3],
+    pub(super) start: usize,
+    pub(super) end: usize,
 }
 
 impl Grid {
-    fn new(points: &[DVec3], radius: f64) -> Grid {
+    pub(super) fn new(points: &[DVec3], radius: f64) -> Grid {
         let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let (min, max) = points.iter().fold(nothing, |(min, max), p| (min.min(*p), max.max(*p)));
         // A radius far below the spacing of the points must not need more cells than integers can count.
@@ -218,7 +218,7 @@ impl Grid {
     }
 
     /// The ranges of the order that hold the 27 cells around `key`.
-    fn rows_around(&self, [z, y, x]: [u64; 3]) -> Vec<std::ops::Range<usize>> {
+    pub(super) fn rows_around(&self, [z, y, x]: [u64; 3]) -> Vec<std::ops::Range<usize>> {
         let mut rows = Vec::with_capacity(9);
         for z in z.saturating_sub(1)..=z + 1 {
             for y in y.saturating_sub(1)..=y + 1 {

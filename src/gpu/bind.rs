@@ -215,6 +215,7 @@ impl Sampler {
             address_mode_v: v,
             mag_filter: wgpu::FilterMode::Linear,
             min_filter: wgpu::FilterMode::Linear,
+            mipmap_filter: wgpu::MipmapFilterMode::Linear,
             compare: (self == Sampler::Shadow).then_some(wgpu::CompareFunction::GreaterEqual),
             ..Default::default()
         })

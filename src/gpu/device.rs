@@ -185,16 +185,19 @@ impl Gpu {
     /// A texture with content: all layers, row by row, top first.
     pub fn texture_with(&self, shape: Shape, bytes: &[u8]) -> Texture {
         let texture = self.texture(shape);
-        self.queue.write_texture(
-            texture.texture.as_image_copy(),
-            bytes,
-            wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(shape.width * shape.format.bytes_per_texel()),
-                rows_per_image: Some(shape.height),
-            },
-            shape.extent(),
-        );
+        let mut rest = bytes;
+        for level in 0..shape.levels {
+            let (width, height) = shape.level(level);
+            let row = width * shape.format.bytes_per_texel();
+            let (these, others) = rest.split_at((row * height * shape.layers) as usize);
+            self.queue.write_texture(
+                wgpu::TexelCopyTextureInfo { mip_level: level, ..texture.texture.as_image_copy() },
+                these,
+                wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: Some(height) },
+                wgpu::Extent3d { width, height, depth_or_array_layers: shape.layers },
+            );
+            rest = others;
+        }
         texture
     }
 

@@ -191,6 +191,7 @@ fn draw(run: &Run, raster: &Raster) -> Result<Images, Problem> {
         height: raster.size.1,
         layers: raster.layers.len() as u32,
         array: raster.array,
+        levels: 1,
         format,
     };
     let mut images: Vec<Texture> = raster.targets.iter().map(|(format, _)| gpu.texture(shape(*format))).collect();

@@ -58,24 +58,40 @@ pub struct Shape {
     /// More than one, or an array by nature: the shader sees `texture_2d_array`.
     pub layers: u32,
     pub array: bool,
+    /// Sizes that it is there in, each half of the one before; passes draw to the first.
+    pub levels: u32,
     pub format: Format,
 }
 
 impl Shape {
     pub fn flat(size: (u32, u32), format: Format) -> Shape {
-        Shape { width: size.0, height: size.1, layers: 1, array: false, format }
+        Shape { width: size.0, height: size.1, layers: 1, array: false, levels: 1, format }
     }
 
     pub fn array(size: (u32, u32), layers: u32, format: Format) -> Shape {
-        Shape { width: size.0, height: size.1, layers, array: true, format }
+        Shape { width: size.0, height: size.1, layers, array: true, levels: 1, format }
     }
 
     pub fn extent(&self) -> wgpu::Extent3d {
         wgpu::Extent3d { width: self.width, height: self.height, depth_or_array_layers: self.layers }
     }
 
+    /// With all smaller sizes, down to a single texel.
+    pub fn with_mips(self) -> Shape {
+        Shape { levels: self.width.max(self.height).max(1).ilog2() + 1, ..self }
+    }
+
+    /// The size of one level.
+    pub fn level(&self, level: u32) -> (u32, u32) {
+        ((self.width >> level).max(1), (self.height >> level).max(1))
+    }
+
     pub fn bytes(&self) -> u64 {
-        self.width as u64 * self.height as u64 * self.layers as u64 * self.format.bytes_per_texel() as u64
+        let texels = |level| {
+            let (width, height) = self.level(level);
+            width as u64 * height as u64
+        };
+        (0..self.levels).map(texels).sum::<u64>() * self.layers as u64 * self.format.bytes_per_texel() as u64
     }
 }
 
@@ -95,6 +111,7 @@ impl Texture {
             dimension: Some(wgpu::TextureViewDimension::D2),
             base_array_layer: layer,
             array_layer_count: Some(1),
+            mip_level_count: Some(1),
             ..Default::default()
         })
     }
@@ -133,7 +150,7 @@ impl Pool {
             device.create_texture(&wgpu::TextureDescriptor {
                 label: None,
                 size: shape.extent(),
-                mip_level_count: 1,
+                mip_level_count: shape.levels,
                 sample_count: 1,
                 dimension: wgpu::TextureDimension::D2,
                 format: shape.format.wgpu(),

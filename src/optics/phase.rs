@@ -58,7 +58,7 @@ pub fn isotropic() -> f64 {
     0.25 / PI
 }
 
-/// Henyey and Greenstein's function [Henyey1941] for the mean cosine `g` in (-1, 1).
+/// Henyey and Greenstein's function [Henyey1941] for the mean cosine `g` in (-1, 1). Twin: `phase.wgsl`.
 pub fn henyey_greenstein(cos: f64, g: f64) -> f64 {
     let q = 1.0 + g * g + 2.0 * g * cos;
     0.25 / PI * (1.0 - g * g) / (q * q.sqrt())
@@ -84,7 +84,7 @@ fn between(above: f64, below: f64) -> f64 {
     if above < below { above - 1.0 } else { 1.0 - below }
 }
 
-/// Schlick's function for `k` in (-1, 1), as [Francois2006] prints it. k is not the mean cosine.
+/// Schlick's function for `k` in (-1, 1), as [Francois2006] prints it. k is not the mean cosine. Twin: `phase.wgsl`.
 pub fn schlick(cos: f64, k: f64) -> f64 {
     let q = 1.0 + k * cos;
     0.25 / PI * (1.0 - k * k) / (q * q)

@@ -91,6 +91,16 @@ pub enum Varying<T> {
     Texture(Arc<TextureMap>),
 }
 
+impl<T> Varying<T> {
+    /// The image, where one says.
+    pub fn map(&self) -> Option<&TextureMap> {
+        match self {
+            Varying::Constant(_) => None,
+            Varying::Texture(map) => Some(map),
+        }
+    }
+}
+
 /// An image file and how its values are meant.
 #[derive(Clone, Debug, Serialize)]
 pub struct TextureMap {

@@ -1,8 +1,9 @@
 //! What will render but will disappoint.
 
 use crate::scene::meaning::Judge;
+use crate::scene::outside::Texture;
 use crate::scene::reader::Reader;
-use crate::scene::{Material, MeshSource, Object, Scene, Substance};
+use crate::scene::{Material, MeshSource, Object, Scene, Substance, Varying};
 use glam::DVec3;
 
 /// Below this reduced albedo light is absorbed before it diffuses, and every profile overestimates it: the dipole's
@@ -12,6 +13,7 @@ const CHANNELS: [&str; 3] = ["red", "green", "blue"];
 
 /// What can be said of a material by itself.
 pub fn material(material: &Material, judge: &mut Judge<'_>) {
+    order(material, judge);
     let Substance::Translucent(medium) = &material.medium else { return };
     let albedo = medium.albedo_prime().to_array();
     let (worst, value) = (0..3).map(|c| (c, albedo[c])).fold((0, 1.0), |a, b| if b.1 < a.1 { b } else { a });
@@ -31,6 +33,44 @@ pub fn material(material: &Material, judge: &mut Judge<'_>) {
             format!(
                 "diffusion holds above {DIFFUSIVE}; compare with the reference, or use Layered, which does not diffuse"
             ),
+        );
+    }
+}
+
+/// Layers that end above the one outside them, somewhere in their maps: there they are not.
+fn order(material: &Material, judge: &mut Judge<'_>) {
+    // Finer than this nobody looks for a mistake.
+    const MOST: u32 = 256;
+    let maps = || material.layers.iter().filter_map(|layer| layer.depth.map());
+    let side = |side: fn(&Texture) -> u32| maps().map(|map| side(&map.texture)).max().unwrap_or(1).clamp(1, MOST);
+    let (width, height) = (side(|texture| texture.width), side(|texture| texture.height));
+    let mut above = vec![0u32; material.layers.len()];
+    for i in 0..width * height {
+        let mut deepest = 0.0;
+        for (layer, above) in material.layers.iter().zip(&mut above) {
+            let depth = match &layer.depth {
+                Varying::Constant(depth) => *depth,
+                Varying::Texture(map) => {
+                    let place = |i: u32, to: u32, of: u32| (u64::from(i) * u64::from(of) / u64::from(to)) as u32;
+                    let (x, y) =
+                        (place(i % width, width, map.texture.width), place(i / width, height, map.texture.height));
+                    map.as_number().of(map.texture.texels[(y * map.texture.width + x) as usize].map(f64::from))
+                }
+            };
+            *above += u32::from(depth < deepest);
+            deepest = f64::max(deepest, depth);
+        }
+    }
+    for (i, above) in above.iter().enumerate().filter(|(_, above)| **above > 0) {
+        let share = 100.0 * f64::from(*above) / f64::from(width * height);
+        judge.warn(
+            &format!("layers[{i}].depth"),
+            format!(
+                "over {} % of its map `{}` ends above a layer outside it: there it is not",
+                digits(share),
+                material.layers[i].name
+            ),
+            "layers go from the outside inwards, and each ends at the deepest depth so far; paint it deeper there",
         );
     }
 }

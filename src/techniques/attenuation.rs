@@ -142,7 +142,7 @@ mod tests {
                 for c in 0..3 {
                     let row = |k: usize| f64::from(rows[4 * k + c]);
                     let found = row(low) * (1.0 - f) + row(low + 1) * f;
-                    assert!((found - function(10.0 * share)[c]).abs() < 2e-3, "{response:?} {share} {c}");
+                    assert!((found - function(10.0 * share)[c]).abs() < 2.5e-3, "{response:?} {share} {c}");
                 }
             }
         }

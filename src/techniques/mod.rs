@@ -7,6 +7,7 @@
 mod attenuation;
 mod depth_map_thickness;
 mod filtered_normals;
+mod layered;
 mod local;
 mod opaque;
 pub mod reference;
@@ -69,6 +70,15 @@ macro_rules! entry {
 pub const REGISTRY: &[Entry] = &[
     entry!(opaque, Opaque),
     entry!(filtered_normals, FilteredNormals),
+    entry!(
+        layered,
+        Layered,
+        "Layered(samples: 4)",
+        "Layered(samples: 10, march: Uniform)",
+        "Layered(samples: 50, march: Uniform)",
+        "Layered(samples: 100, march: Uniform)",
+        "Layered(refract: false)"
+    ),
     Entry {
         name: "SphericalThickness",
         manual: include_str!("spherical_thickness/mod.rs"),
@@ -110,7 +120,7 @@ pub const REGISTRY: &[Entry] = &[
 ];
 
 /// Techniques that a scene may name one day.
-const LATER: [&str; 9] = [
+const LATER: [&str; 8] = [
     "PrecomputedTransfer",
     "LongRange",
     "ScreenSpace",
@@ -118,7 +128,6 @@ const LATER: [&str; 9] = [
     "MultiresolutionSplatting",
     "SeparableScreenSpace",
     "AdjacencyMaps",
-    "Layered",
     "Auto",
 ];
 

@@ -163,3 +163,40 @@ fn an_interrupted_bake_keeps_what_was_done_and_the_next_goes_on() {
     let again = desk.run(&["bake", "slow.ron", "--set", "lights=[]", "--json"]).ok().json();
     assert!(again["from_disk"].as_u64().unwrap() >= 1, "{again}");
 }
+
+/// A square of side 1 in the plane z, with texture coordinates.
+fn sheet(z: f64) -> String {
+    format!("v 0 0 {z}\nv 1 0 {z}\nv 1 1 {z}\nv 0 1 {z}\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n")
+}
+
+#[test]
+fn layers_paints_how_deep_a_mesh_lies_and_says_what_to_write() {
+    let desk = Desk::new();
+    desk.write("outer.obj", sheet(0.0));
+    desk.write("inner.obj", sheet(-0.25));
+    desk.write("deeper.obj", sheet(-0.5));
+    let words =
+        ["layers", "outer.obj", "inner.obj", "deeper.obj", "-o", "depths.png", "--size", "8x4", "--mm-per-unit", "10"];
+    let ran = desk.run(&words).ok();
+    let told =
+        |channel: &str| format!("depth: Texture(image: \"depths.png\", channel: {channel}, range: (0.0, 5.000000))");
+    ran.says(&["depths.png  2 layers, up to 5.000 mm deep", &told("R"), &told("G")]);
+    let image = image::load_from_memory(&desk.read("depths.png")).expect("it is a PNG").to_rgb8();
+    assert_eq!(image.dimensions(), (8, 4));
+    // Numbers, not colours: half the depth is half the level.
+    assert!(image.pixels().all(|pixel| pixel.0 == [128, 255, 255]), "{:?}", image.get_pixel(3, 2));
+    let layer = |channel: &str| format!("(medium: Preset(\"skin1\"), {}), ", told(channel));
+    desk.write("painted.ron", format!("Material(version: 1, layers: [{}{}])", layer("R"), layer("G")));
+    desk.run(&["check", "painted.ron"]).ok();
+    // The other way round the second layer would end above the first.
+    desk.write("painted.ron", format!("Material(version: 1, layers: [{}{}])", layer("G"), layer("R")));
+    let checked = desk.run(&["check", "painted.ron"]).ok();
+    assert!(checked.err.contains("layers[1].depth: over 100 % of its map `layer 1` ends above"), "{checked:#?}");
+    // Nothing below, no map, no mesh.
+    let run = |outer: &str, inner: &str| desk.run(&["layers", outer, inner, "-o", "no.png"]);
+    run("inner.obj", "outer.obj").fails(1, &["outer.obj", "no ray inwards meets it", "hint: "]);
+    desk.write("bare.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n");
+    run("bare.obj", "inner.obj").fails(1, &["bare.obj", "no texture coordinates", "hint: "]);
+    run("outer.obj", "nothing.obj").fails(1, &["nothing.obj", "cannot be read"]);
+    assert!(!desk.path("no.png").exists());
+}

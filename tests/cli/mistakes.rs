@@ -169,7 +169,7 @@ fn a_kernel_that_is_not_there_yet() {
 #[test]
 fn a_technique_that_is_not_there_yet() {
     let desk = Desk::new();
-    for name in ["SphericalThickness(bands: 5)", "LongRange()", "ScreenSpace", "Layered(refract: false)", "Auto"] {
+    for name in ["SphericalThickness(bands: 5)", "LongRange()", "ScreenSpace", "Auto"] {
         desk.write("later.ron", SCENE.replace("Opaque()", name));
         let ran = desk.run(&["check", "later.ron"]);
         if ran.status != 0 {

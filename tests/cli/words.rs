@@ -3,8 +3,20 @@
 use crate::{Desk, NO_ADAPTER};
 use serde_json::Value;
 
-const COMMANDS: [&str; 11] =
-    ["new", "render", "preview", "watch", "check", "explain", "techniques", "bake", "media", "cache", "doctor"];
+const COMMANDS: [&str; 12] = [
+    "new",
+    "render",
+    "preview",
+    "watch",
+    "check",
+    "explain",
+    "techniques",
+    "bake",
+    "layers",
+    "media",
+    "cache",
+    "doctor",
+];
 
 #[test]
 fn without_words_it_says_what_it_is_a_first_session_and_the_rest() {

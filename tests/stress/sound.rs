@@ -9,13 +9,15 @@ use half::f16;
 use std::collections::HashSet;
 
 /// Steps that make something else than light, by the beginning of their names: what they make may be negative.
-const SIGNED: [(&str, &str); 8] = [
+const SIGNED: [(&str, &str); 10] = [
     ("geometry.", "positions and normals"),
     ("filtered_normals.", "normals"),
     ("frame.gbuffer", "positions"),
     ("frame.openness", "spherical harmonics of what is open"),
     ("frame.through", "a depth: where a ray leaves less where it enters"),
     ("sky.light", "directions, beside the light from there"),
+    ("sky.lamps", "directions, likewise"),
+    ("layered.", "planes, and slopes of maps"),
     ("sky.harmonics", "spherical harmonics of light"),
     ("thickness.", "spherical harmonics"),
 ];

@@ -1,6 +1,8 @@
 // How far a point lies from a lamp, counted so that the object's middle has its diagonal: never 0, and small beside a lamp
 // that is far away. Object space.
 
+#include "frame/lights.wgsl"
+
 struct Measure {
     middle: vec3f,
     diagonal: f32,

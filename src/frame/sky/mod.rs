@@ -6,6 +6,7 @@
 //! whole sky and hides none of it: `explain` says so.
 
 mod harmonics;
+mod lamps;
 mod light;
 mod mirror;
 
@@ -103,8 +104,13 @@ impl Frame<'_> {
     }
 
     fn sky_light(&self, plan: &mut Plan, surroundings: &Surroundings) -> Slot<Buffer> {
-        let cells = surroundings.image.map(|image| plan.bake(SkyCells { image, rotation: surroundings.rotation }));
+        let cells = self.sky_cells(plan, surroundings);
         plan.add(SkyLight { radiance: surroundings.radiance, cells })
+    }
+
+    /// The mean radiance of an image around each direction; none where the sky is even.
+    fn sky_cells(&self, plan: &mut Plan, surroundings: &Surroundings) -> Option<Slot<Vec<Vec3>>> {
+        surroundings.image.map(|image| plan.bake(SkyCells { image, rotation: surroundings.rotation }))
     }
 
     /// The irradiance that enters at each vertex from the surroundings, for a normal each; 16 bytes a vertex.

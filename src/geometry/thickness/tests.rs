@@ -54,8 +54,9 @@ fn error_on_a_sphere(directions: usize) -> (f64, [f64; 8]) {
     for (v, n) in mesh.normals.iter().enumerate() {
         let y = sh_basis(-n.as_dvec3(), 8);
         for (l, worst) in worst.iter_mut().enumerate() {
-            for i in l * l..(l + 1) * (l + 1) {
-                let error = (f64::from(found.at(v, 0)[i]) - radius * CLOSED[l] * y[i]).abs();
+            let band = l * l..(l + 1) * (l + 1);
+            for (found, y) in found.at(v, 0)[band.clone()].iter().zip(&y[band]) {
+                let error = (f64::from(*found) - radius * CLOSED[l] * y).abs();
                 *worst = worst.max(error);
                 if l < 5 {
                     sum += error * error;

@@ -1,0 +1,418 @@
+// Light that goes into layers, scatters once and comes out [Francois2006].
+//
+// From where the eye's ray enters, at P, it is followed to the depth below which nothing is seen, in steps. A point M of
+// it lies at a depth below the fitted plane, and the layer there is the first that reaches deeper at M's place in the map.
+// Light comes to M through a plane between the tangent one at P and the fitted one [eqs. 9, 10], through layers as thick
+// as the mean of those over M and over where it enters [eqs. 11, 12].
+
+#include "frame/scene.wgsl"
+#include "frame/surface.wgsl"
+#include "frame/lights.wgsl"
+#include "optics/fresnel.wgsl"
+#include "optics/phase.wgsl"
+
+struct March {
+    samples: u32,
+}
+
+// What lies below a thing. Lengths are the world's.
+struct Stack {
+    // Its layers, outermost first, and the medium below them: from `first` to `last`.
+    first: u32,
+    last: u32,
+    // The first of its maps of depths, four layers each; -1 where all depths are constant.
+    map: i32,
+    // What 1 in them stands for.
+    deepest: f32,
+    // No way through it is longer.
+    reach: f32,
+    // The index by which rays are bent.
+    bend: f32,
+}
+
+struct Stratum {
+    sigma_t: vec3f,
+    // Where it ends, if that is the same everywhere.
+    depth: f32,
+    sigma_s: vec3f,
+    is_schlick: u32,
+    // Of the phase function, for each channel.
+    parameter: vec3f,
+}
+
+// A part of the sky.
+struct SkyLamp {
+    direction: vec3f,
+    // How far it reaches to either side, as a cosine.
+    spread: f32,
+    light: vec3f,
+}
+
+@group(0) @binding(0) var<uniform> camera: Camera;
+@group(0) @binding(1) var<storage, read> objects: array<Object>;
+@group(0) @binding(2) var packed_map: texture_2d<u32>;
+#if LIGHTS
+@group(0) @binding(3) var<storage, read> lights: array<Light>;
+#endif
+#if SHADOWS
+@group(0) @binding(4) var visibility: texture_2d_array<f32>;
+#endif
+#if SKY_LAMPS
+@group(0) @binding(5) var<storage, read> sky_lamps: array<SkyLamp>;
+#endif
+@group(0) @binding(6) var<uniform> march: March;
+@group(0) @binding(7) var<storage, read> stacks: array<Stack>;
+@group(0) @binding(8) var<storage, read> strata: array<Stratum>;
+#if DEPTHS
+@group(0) @binding(9) var depth_maps: texture_2d_array<f32>;
+@group(0) @binding(10) var repeat: sampler;
+#endif
+
+struct Vertex {
+    @invariant @builtin(position) clip: vec4f,
+    @location(0) position: vec3f,
+    // The fitted plane: its normal, and its distance from the surface along that.
+    @location(1) plane: vec4f,
+    @location(2) @interpolate(flat) object: u32,
+#if DEPTHS
+    @location(3) uv: vec2f,
+    // How u and v change along the surface.
+    @location(4) slope_u: vec3f,
+    @location(5) slope_v: vec3f,
+#endif
+#if SKY_LAMPS
+    @location(6) share_0: vec4f,
+    @location(7) share_1: vec4f,
+    @location(8) share_2: vec4f,
+    @location(9) share_3: vec4f,
+#endif
+}
+
+@vertex
+fn vertex(
+    @builtin(instance_index) index: u32,
+    @location(0) position: vec3f,
+    @location(1) plane: vec4f,
+#if SKY_LAMPS
+    @location(2) share_0: vec4f,
+    @location(3) share_1: vec4f,
+    @location(4) share_2: vec4f,
+    @location(5) share_3: vec4f,
+#if DEPTHS
+    @location(6) uv_slope: vec4f,
+    @location(7) slopes: vec4f,
+#endif
+#else
+#if DEPTHS
+    @location(2) uv_slope: vec4f,
+    @location(3) slopes: vec4f,
+#endif
+#endif
+) -> Vertex {
+    var out: Vertex;
+    out.position = eye_from_object(objects[index], position);
+    out.clip = project(camera, out.position);
+    out.plane = vec4f(turned(objects[index], plane.xyz), plane.w);
+    out.object = index;
+#if DEPTHS
+    out.uv = uv_slope.xy;
+    out.slope_u = turned(objects[index], vec3f(uv_slope.zw, slopes.x));
+    out.slope_v = turned(objects[index], slopes.yzw);
+#endif
+#if SKY_LAMPS
+    out.share_0 = share_0;
+    out.share_1 = share_1;
+    out.share_2 = share_2;
+    out.share_3 = share_3;
+#endif
+    return out;
+}
+
+// Cosines below this count as this: what is seen so edge-on differs by less than the bound itself.
+const GRAZING: f32 = 1e-4;
+
+// A pixel's ray, from where it enters on. Places are relative to that, but for `origin`.
+struct Ray {
+    stack: Stack,
+    eta: f32,
+    // In eye space.
+    origin: vec3f,
+    // The normal of the surface, and the fitted plane.
+    normal: vec3f,
+    plane: vec4f,
+    direction: vec3f,
+    // Depth gained per length.
+    fall: f32,
+    // Where it ends.
+    end: f32,
+    uv: vec2f,
+    slope_u: vec3f,
+    slope_v: vec3f,
+    // Of the maps' levels.
+    level: f32,
+}
+
+fn uv_at(ray: Ray, p: vec3f) -> vec2f {
+    return ray.uv + vec2f(dot(ray.slope_u, p), dot(ray.slope_v, p));
+}
+
+// Where the four layers from `first` on end, at a place in the map.
+fn depths(ray: Ray, uv: vec2f, first: u32) -> vec4f {
+    let stack = ray.stack;
+#if DEPTHS
+    if stack.map >= 0 {
+        // v runs upwards, rows run downwards.
+        let at = vec2f(uv.x, 1.0 - uv.y);
+        return stack.deepest * textureSampleLevel(depth_maps, repeat, at, stack.map + i32(first >> 2u), ray.level);
+    }
+#endif
+    let i = min(vec4u(stack.first + first) + vec4u(0u, 1u, 2u, 3u), vec4u(stack.last));
+    return vec4f(strata[i.x].depth, strata[i.y].depth, strata[i.z].depth, strata[i.w].depth);
+}
+
+// The depth at P's place in the map above which lies the optical depth `wanted`. Channels differ: it is that of one
+// between their mean and the clearest, or of the clearest.
+fn depth_of(ray: Ray, wanted: f32, of_clearest: bool) -> f32 {
+    let count = ray.stack.last - ray.stack.first;
+    var left = wanted;
+    var top = 0.0;
+    var ends = vec4f(0.0);
+    for (var j = 0u; j <= count; j++) {
+        if (j & 3u) == 0u { ends = depths(ray, ray.uv, j); }
+        let bottom = select(max(top, ends[j & 3u]), max(top, ray.stack.reach), j == count);
+        let s = strata[ray.stack.first + j].sigma_t;
+        let clearest = min(s.r, min(s.g, s.b));
+        let sigma = select(0.5 * clearest + (s.r + s.g + s.b) / 6.0, clearest, of_clearest);
+        if sigma * (bottom - top) >= left {
+            return top + left / sigma;
+        }
+        left -= sigma * (bottom - top);
+        top = bottom;
+    }
+    return top;
+}
+
+// Two optical depths, straight down to the depths `h`, under M and where light enters alike [eq. 12]. `first` are the first
+// four depths at M.
+fn optical_depths(ray: Ray, uv_m: vec2f, first: vec4f, uv_k: vec2f, h: vec2f) -> mat2x3f {
+    let count = ray.stack.last - ray.stack.first;
+    let deepest = max(h.x, h.y);
+    var sum = mat2x3f(vec3f(0.0), vec3f(0.0));
+    var top = 0.0;
+    var ends = vec4f(0.0);
+    for (var j = 0u; j <= count; j++) {
+        if (j & 3u) == 0u {
+            var at_m = first;
+            if j > 0u { at_m = depths(ray, uv_m, j); }
+            ends = 0.5 * (at_m + depths(ray, uv_k, j));
+        }
+        let bottom = select(min(deepest, max(top, ends[j & 3u])), deepest, j == count);
+        let within = clamp(h - top, vec2f(0.0), vec2f(bottom - top));
+        let sigma_t = strata[ray.stack.first + j].sigma_t;
+        sum += mat2x3f(within.x * sigma_t, within.y * sigma_t);
+        if bottom >= deepest {
+            break;
+        }
+        top = bottom;
+    }
+    return sum;
+}
+
+// The plane that light comes in through on its way to the point at `s` [eq. 9]: its normal, and how far above the point
+// it lies.
+fn plane_above(ray: Ray, s: f32) -> vec4f {
+    let t = s / ray.end;
+    let normal = normalize(mix(ray.normal, ray.plane.xyz, t));
+    return vec4f(normal, max(0.0, dot(t * ray.plane.w * ray.plane.xyz - s * ray.direction, normal)));
+}
+
+// The mean of exp(-x) for x from a to b, in each channel.
+fn mean_exp(a: vec3f, b: vec3f) -> vec3f {
+    let x = abs(b - a);
+    let series = 1.0 - x * (0.5 - x * (1.0 / 6.0 - x / 24.0));
+    return exp(-min(a, b)) * select((1.0 - exp(-x)) / max(x, vec3f(1e-20)), series, x < vec3f(0.03));
+}
+
+fn phase(stratum: Stratum, cos: f32) -> vec3f {
+    let k = stratum.parameter;
+    if stratum.is_schlick != 0u {
+        return vec3f(schlick(cos, k.r), schlick(cos, k.g), schlick(cos, k.b));
+    }
+    return vec3f(henyey_greenstein(cos, k.r), henyey_greenstein(cos, k.g), henyey_greenstein(cos, k.b));
+}
+
+#if SKY_LAMPS
+// Where the light of a lamp comes from that lies above the horizon of a plane.
+fn above_horizon(lamp: SkyLamp, normal: vec3f) -> vec3f {
+    let cos = dot(lamp.direction, normal);
+    if abs(cos) >= lamp.spread {
+        return lamp.direction;
+    }
+    let middle = 0.5 * (cos + lamp.spread);
+    let sideways = lamp.direction - cos * normal;
+    return middle * normal + sqrt((1.0 - middle * middle) / max(1e-20, dot(sideways, sideways))) * sideways;
+}
+
+var<private> shares: array<vec4f, 4>;
+#endif
+
+// What lamps send along the ray from its part between `start` and `to`, which lies in one layer; the optical depths along
+// the ray are those of its ends.
+fn scattered_between(ray: Ray, stratum: Stratum, start: f32, to: f32, near: vec3f, far: vec3f, pixel: vec2i) -> vec3f {
+#if UNIFORM
+    let middle = start;
+#else
+    let middle = 0.5 * (start + to);
+#endif
+    let uv_m = uv_at(ray, middle * ray.direction);
+    let first_depths = depths(ray, uv_m, 0u);
+    let plane = plane_above(ray, middle);
+    let heights = vec2f(plane_above(ray, start).w, plane_above(ray, to).w);
+    let above = ray.origin + middle * ray.direction + plane.w * plane.xyz;
+    var lamps = 0u;
+#if LIGHTS
+    lamps = arrayLength(&lights);
+#endif
+    var count = lamps;
+#if SKY_LAMPS
+    count += arrayLength(&sky_lamps);
+#endif
+    var sum = vec3f(0.0);
+    for (var l = 0u; l < count; l++) {
+        var samples = 1;
+        var seen = 1.0;
+#if LIGHTS
+        if l < lamps {
+            samples = light_samples(lights[l]);
+#if SHADOWS
+            if lights[l].visibility >= 0 {
+                seen = textureLoad(visibility, pixel, lights[l].visibility, 0).r;
+            }
+#endif
+        }
+#endif
+        if seen <= 0.0 {
+            continue;
+        }
+        for (var i = 0; i < samples; i++) {
+            var light_in: Incident;
+#if LIGHTS
+            if l < lamps { light_in = incident(lights[l], i, above); }
+#endif
+#if SKY_LAMPS
+            if l >= lamps {
+                let lamp = sky_lamps[l - lamps];
+                let share = shares[(l - lamps) >> 2u][(l - lamps) & 3u];
+                light_in = Incident(above_horizon(lamp, plane.xyz), share * lamp.light, 1.0, 0.0);
+            }
+#endif
+            // Behind its plane a point is unlit.
+            let cos_in = dot(plane.xyz, light_in.direction);
+            if cos_in <= 0.0 || all(light_in.irradiance <= vec3f(0.0)) {
+                continue;
+            }
+            let along = (light_in.direction - cos_in * plane.xyz) / ray.stack.bend;
+            let cos_below = max(GRAZING, sqrt(max(0.0, 1.0 - dot(along, along))));
+            let to_light = along + cos_below * plane.xyz;
+            // A beam is as much wider below as it is bent.
+            let width = select(cos_in / cos_below, 1.0, ray.stack.bend == 1.0);
+            let enters = width * (1.0 - fresnel_dielectric(min(1.0, cos_in), ray.eta));
+            let uv_k = uv_at(ray, middle * ray.direction + (plane.w / cos_below) * to_light);
+            let down = optical_depths(ray, uv_m, first_depths, uv_k, heights);
+            let first = near + down[0] / cos_below;
+#if UNIFORM
+            let through = exp(-first);
+#else
+            let through = mean_exp(first, far + down[1] / cos_below);
+#endif
+            let turned = phase(stratum, clamp(-dot(to_light, ray.direction), -1.0, 1.0));
+            sum += seen * enters * light_in.irradiance * turned * through;
+        }
+    }
+    return (to - start) * stratum.sigma_s * sum;
+}
+
+@fragment
+fn fragment(in: Vertex) -> @location(0) vec4f {
+    let object = objects[in.object];
+    let pixel = vec2i(in.clip.xy);
+    var ray: Ray;
+    ray.stack = stacks[in.object];
+#if DEPTHS
+    ray.uv = in.uv;
+    ray.slope_u = in.slope_u;
+    ray.slope_v = in.slope_v;
+    let texels = vec2f(textureDimensions(depth_maps));
+    let texels_across = max(length(dpdx(in.uv) * texels), length(dpdy(in.uv) * texels));
+    ray.level = log2(max(1.0, texels_across));
+#endif
+#if SKY_LAMPS
+    shares = array<vec4f, 4>(in.share_0, in.share_1, in.share_2, in.share_3);
+#endif
+    ray.eta = object.eta;
+    ray.origin = in.position;
+    ray.normal = unpack_direction(textureLoad(packed_map, pixel, 0).x);
+    ray.plane = vec4f(normalize(in.plane.xyz), in.plane.w);
+    // Where an interpolated normal turns away from the eye, the surface is seen edge on.
+    let to_eye = -normalize(in.position);
+    let cos_out = max(0.0, dot(ray.normal, to_eye));
+    let leaves = (1.0 - fresnel_dielectric(cos_out, object.eta)) / (ray.stack.bend * ray.stack.bend);
+    let along = (dot(ray.normal, to_eye) * ray.normal - to_eye) / ray.stack.bend;
+    ray.direction = select(-to_eye, along - sqrt(max(0.0, 1.0 - dot(along, along))) * ray.normal, ray.stack.bend > 1.0);
+    ray.fall = max(GRAZING, -dot(ray.plane.xyz, ray.direction));
+
+    // Of what lies deeper, less than a thousandth gets out.
+    const DARK = 6.9;
+#if UNIFORM
+    // The paper's depth is one for all angles [eq. 15].
+    let deepest = depth_of(ray, DARK, true);
+#else
+    let deepest = depth_of(ray, DARK * ray.fall, true);
+#endif
+    ray.end = max(1e-30, min(deepest / ray.fall, ray.stack.reach));
+
+    let layers = ray.stack.last - ray.stack.first;
+    var radiance = vec3f(0.0);
+    var passed = vec3f(0.0);
+    var start = 0.0;
+    for (var k = 1u; k <= march.samples; k++) {
+        let share = f32(k) / f32(march.samples);
+#if UNIFORM
+        let to = share * ray.end;
+        let looked_at = start;
+#else
+        // Steps through which the same share of light is lost; the last goes on to the end.
+        var to = ray.end;
+        if k < march.samples {
+            to = clamp(depth_of(ray, -log(1.0 - share) * ray.fall, false) / ray.fall, start, ray.end);
+        }
+        let looked_at = 0.5 * (start + to);
+#endif
+        let uv = uv_at(ray, looked_at * ray.direction);
+        let at = vec2f(start, to) * ray.fall;
+        var top = 0.0;
+        var ends = vec4f(0.0);
+        for (var j = 0u; j <= layers; j++) {
+            if (j & 3u) == 0u { ends = depths(ray, uv, j); }
+            let bottom = select(max(top, ends[j & 3u]), max(top, at.y), j == layers);
+#if UNIFORM
+            // The layer of the step's beginning is that of all of it.
+            let part = select(vec2f(0.0), vec2f(start, to), at.x >= top && (at.x < bottom || j == layers));
+#else
+            let part = select(vec2f(0.0), clamp(vec2f(top, bottom), at.xx, at.yy) / ray.fall, bottom > top);
+#endif
+            if part.y > part.x {
+                let stratum = strata[ray.stack.first + j];
+                let far = passed + (part.y - part.x) * stratum.sigma_t;
+                radiance += scattered_between(ray, stratum, part.x, part.y, passed, far, pixel);
+                passed = far;
+            }
+            if bottom >= at.y && bottom > at.x {
+                break;
+            }
+            top = bottom;
+        }
+        start = to;
+    }
+    return vec4f(leaves * radiance, 1.0);
+}

@@ -1,0 +1,350 @@
+//! Layers obey the laws of light that scatters once: closed forms where there are some, and what may not matter.
+
+mod studio;
+
+use diaphane::image::Image;
+use diaphane::optics::fresnel::fresnel_dielectric;
+use diaphane::optics::phase::Phase;
+use diaphane::render::{self, Look};
+use diaphane::store::{Key, Plan};
+use glam::{DVec3, dvec3};
+use std::collections::{BTreeMap, BTreeSet};
+use studio::{Studio, mean, most_apart, read, studio};
+
+/// One medium, 1/mm, with its phase function's own parameter.
+#[derive(Clone, Copy)]
+struct Medium {
+    sigma_a: DVec3,
+    sigma_s: DVec3,
+    phase: Phase,
+    parameter: f64,
+}
+
+const SKIN: Medium = Medium {
+    sigma_a: dvec3(0.3, 0.6, 1.0),
+    sigma_s: dvec3(2.0, 1.5, 1.0),
+    phase: Phase::HenyeyGreenstein,
+    parameter: 0.25,
+};
+const FLESH: Medium =
+    Medium { sigma_a: dvec3(0.8, 0.2, 0.1), sigma_s: dvec3(1.0, 3.0, 6.0), phase: Phase::Schlick, parameter: 0.6 };
+const BLACK: Medium =
+    Medium { sigma_a: dvec3(9.0, 9.0, 9.0), sigma_s: DVec3::ZERO, phase: Phase::HenyeyGreenstein, parameter: 0.0 };
+
+impl Medium {
+    fn sigma_t(&self) -> DVec3 {
+        self.sigma_a + self.sigma_s
+    }
+
+    fn text(&self) -> String {
+        let v = |v: DVec3| format!("({:?}, {:?}, {:?})", v.x, v.y, v.z);
+        // A file gives what its phase function is named after: Schlick's k for Schlick.
+        format!(
+            "medium: Coefficients(sigma_a: {}, sigma_s: {}, g: {:?}), phase: {:?}",
+            v(self.sigma_a),
+            v(self.sigma_s),
+            self.parameter,
+            self.phase
+        )
+    }
+}
+
+fn material(ior: f64, layers: &[(Medium, String)], below: Medium) -> String {
+    let layers: String =
+        layers.iter().map(|(medium, depth)| format!("({}, depth: {depth}), ", medium.text())).collect();
+    format!("Material(version: 1, surface: (ior: {ior:?}, roughness: 0.3), {}, layers: [{layers}])", below.text())
+}
+
+fn constant(layers: &[(Medium, f64)]) -> Vec<(Medium, String)> {
+    layers.iter().map(|(medium, depth)| (*medium, format!("{depth:?}"))).collect()
+}
+
+const SIZE: (u32, u32) = (24, 16);
+const FOV: f64 = 50.0;
+
+/// A wide slab below y = 0, of 40 mm.
+fn slab(eye: DVec3, lights: &str, technique: &str) -> String {
+    format!(
+        r#"mm_per_unit: 10, camera: (eye: ({:?}, {:?}, {:?}), target: (0, 0, 0), fov_y_deg: {FOV:?}), lights: [{lights}],
+        objects: [(mesh: Slab(size: (90, 90, 4), segments: (6, 6)), material: "thing.ron",
+            transform: (translate: (0, -2, 0), rotate_deg: (-90, 0, 0)))],
+        view: (technique: {technique}, size: {SIZE:?}, antialias: 1)"#,
+        eye.x, eye.y, eye.z
+    )
+}
+
+fn ray(eye: DVec3, x: u32, y: u32) -> DVec3 {
+    let forward = -eye.normalize();
+    let right = forward.cross(DVec3::Y).normalize();
+    let up = right.cross(forward);
+    let half = (0.5 * FOV.to_radians()).tan() * 2.0 / f64::from(SIZE.1);
+    let (i, j) = (f64::from(x) + 0.5 - 0.5 * f64::from(SIZE.0), 0.5 * f64::from(SIZE.1) - f64::from(y) - 0.5);
+    (forward + half * (i * right + j * up)).normalize()
+}
+
+/// Radiance that scatters once in a stack of layers over a half space and goes to the eye against `view`, for irradiance 1
+/// on a plane that faces `to_light`; up is y. `bend` is the index by which rays are bent.
+fn once(ior: f64, bend: f64, view: DVec3, to_light: DVec3, layers: &[(Medium, f64)], below: Medium) -> DVec3 {
+    let below_surface = |outside: DVec3| {
+        let along = dvec3(outside.x, 0.0, outside.z) / bend;
+        along + DVec3::Y * (1.0 - along.length_squared()).sqrt()
+    };
+    let (to_eye, to_light_in) = (below_surface(-view), below_surface(to_light));
+    let (out, into) = (to_eye.y, to_light_in.y);
+    let width = if bend == 1.0 { 1.0 } else { to_light.y / into };
+    let through =
+        (1.0 - fresnel_dielectric(-view.y, ior)) * (1.0 - fresnel_dielectric(to_light.y, ior)) * width / (bend * bend);
+    let (mut sum, mut passed, mut top) = (DVec3::ZERO, DVec3::ZERO, 0.0);
+    for (medium, bottom) in layers.iter().copied().chain([(below, f64::INFINITY)]) {
+        let rate = medium.sigma_t() * (1.0 / out + 1.0 / into);
+        let phase = medium.phase.value(to_eye.dot(to_light_in), medium.parameter);
+        let lost = 1.0 - (-rate * (bottom - top)).exp();
+        sum += (-passed).exp() * medium.sigma_s * phase * lost / (rate * out);
+        passed += rate * (bottom - top);
+        top = bottom;
+    }
+    through * sum
+}
+
+/// The largest relative error of a picture against a formula of the view's direction.
+fn error(image: &Image, eye: DVec3, expected: impl Fn(DVec3) -> DVec3) -> f64 {
+    let mut worst = 0.0f64;
+    for y in 0..image.height {
+        for x in 0..image.width {
+            let found = DVec3::from(image.at(x, y).map(f64::from));
+            let expected = expected(ray(eye, x, y));
+            worst = worst.max(((found - expected) / expected).abs().max_element());
+            assert!(found.is_finite());
+        }
+    }
+    worst
+}
+
+fn scattered(studio: &mut Studio, text: &str) -> std::sync::Arc<Image> {
+    let scene = studio.scene(text);
+    let mut look = Look::of(&scene);
+    look.view.part = diaphane::frame::Part::Scattered;
+    studio.shoot(&scene, &look).1
+}
+
+const ABOVE: DVec3 = dvec3(0.5, 4.0, 3.0);
+const SUN: &str = "Directional(direction: (-1, -2, -0.5), irradiance: 1, shadow: false)";
+
+fn to_sun() -> DVec3 {
+    dvec3(1.0, 2.0, 0.5).normalize()
+}
+
+#[test]
+fn a_stack_of_layers_has_its_closed_form_in_few_steps() {
+    let mut studio = studio();
+    let five = [(SKIN, 0.2), (FLESH, 0.3), (SKIN, 0.45), (BLACK, 0.5), (FLESH, 2.0)];
+    for layers in [&[][..], &[(SKIN, 0.4)], &[(FLESH, 0.3), (SKIN, 0.9)], &five] {
+        for (ior, refract) in [(1.33, true), (1.33, false), (1.0, true)] {
+            studio.write("thing.ron", material(ior, &constant(layers), FLESH));
+            let bend = if refract { ior } else { 1.0 };
+            for samples in [1, 5] {
+                let image = scattered(
+                    &mut studio,
+                    &slab(ABOVE, SUN, &format!("Layered(samples: {samples}, refract: {refract})")),
+                );
+                let error = error(&image, ABOVE, |view| once(ior, bend, view, to_sun(), layers, FLESH));
+                assert!(
+                    error < 3e-3,
+                    "{} layers, ior {ior}, refract {refract}, {samples} steps: {error:.2e}",
+                    layers.len()
+                );
+            }
+        }
+    }
+    // Teeth: another depth, another phase function, another index.
+    let layers = [(SKIN, 0.4)];
+    studio.write("thing.ron", material(1.33, &constant(&layers), FLESH));
+    let image = scattered(&mut studio, &slab(ABOVE, SUN, "Layered()"));
+    let other = Medium { phase: Phase::Schlick, ..SKIN };
+    assert!(error(&image, ABOVE, |view| once(1.33, 1.33, view, to_sun(), &[(SKIN, 0.42)], FLESH)) > 5e-3);
+    assert!(error(&image, ABOVE, |view| once(1.33, 1.33, view, to_sun(), &[(other, 0.4)], FLESH)) > 5e-3);
+    assert!(error(&image, ABOVE, |view| once(1.38, 1.38, view, to_sun(), &layers, FLESH)) > 5e-3);
+}
+
+#[test]
+fn the_papers_steps_get_there_slowly_and_steps_in_closed_form_at_once() {
+    let mut studio = studio();
+    let layers = [(SKIN, 0.3), (FLESH, 0.8)];
+    studio.write("thing.ron", material(1.33, &constant(&layers), SKIN));
+    let mut of = |technique: &str| {
+        let image = scattered(&mut studio, &slab(ABOVE, SUN, technique));
+        error(&image, ABOVE, |view| once(1.33, 1.33, view, to_sun(), &layers, SKIN))
+    };
+    let uniform = [10, 50, 100, 800].map(|n| of(&format!("Layered(march: Uniform, samples: {n})")));
+    assert!(uniform.is_sorted_by(|a, b| a > b), "{uniform:?}");
+    assert!(uniform[0] > 0.1 && uniform[3] < 0.02, "{uniform:?}");
+    assert!(of("Layered(samples: 2)") < 0.2 * uniform[2]);
+}
+
+#[test]
+fn layers_that_are_none_change_nothing() {
+    let mut studio = studio();
+    let ball = r#"mm_per_unit: 10, camera: (eye: (0, 1, 4), target: (0, 0, 0), fov_y_deg: 36),
+        lights: [Directional(direction: (-1, -2, -1), irradiance: 3), Environment(radiance: 0.5)],
+        objects: [(mesh: Sphere(radius: 1, subdivisions: 4), material: "thing.ron")],
+        view: (technique: Layered(), size: (32, 32), antialias: 1)"#;
+    let mut of = |layers: &[(Medium, f64)], below: Medium| {
+        studio.write("thing.ron", material(1.4, &constant(layers), below));
+        scattered(&mut studio, ball)
+    };
+    // One medium in any number of layers is that medium, but for where its steps end.
+    let whole = of(&[], SKIN);
+    let bright = mean(&whole);
+    assert!(bright > 1e-3);
+    assert!(most_apart(&whole, &of(&[(SKIN, 0.3)], SKIN)) < 0.01 * bright);
+    assert!(
+        most_apart(&whole, &of(&[(SKIN, 0.1), (SKIN, 0.2), (SKIN, 0.3), (SKIN, 0.5), (SKIN, 1.0)], SKIN))
+            < 0.01 * bright
+    );
+    // Split in two.
+    let two = of(&[(SKIN, 0.3), (FLESH, 0.8)], SKIN);
+    assert!(most_apart(&two, &of(&[(SKIN, 0.1), (SKIN, 0.3), (FLESH, 0.8)], SKIN)) < 0.01 * bright);
+    assert!(most_apart(&two, &whole) > 0.1 * bright);
+    // What absorbs, and lies deeper under what does so too, is darker.
+    let depths = [0.05, 0.1, 0.3, 1.0].map(|depth| mean(&of(&[(BLACK, depth)], SKIN)));
+    assert!(depths.is_sorted_by(|a, b| a > b), "{depths:?}");
+}
+
+/// A PNG of one grey level on the left and another on the right.
+fn halves(left: u8, right: u8) -> Vec<u8> {
+    let image = image::GrayImage::from_fn(8, 8, |x, _| image::Luma([if x < 4 { left } else { right }]));
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image.write_to(&mut bytes, image::ImageFormat::Png).expect("a PNG can be written");
+    bytes.into_inner()
+}
+
+#[test]
+fn maps_say_where_layers_end() {
+    let mut studio = studio();
+    studio.write("even.png", halves(51, 51));
+    studio.write("halves.png", halves(51, 204));
+    let scene = slab(ABOVE, SUN, "Layered()");
+    let mut of = |layers: &[(Medium, String)]| {
+        studio.write("thing.ron", material(1.33, layers, FLESH));
+        scattered(&mut studio, &scene)
+    };
+    let map = |image: &str, more: &str| format!("Texture(image: \"{image}\", range: (0.0, 2.0){more})");
+    let plain = of(&[(SKIN, "0.4".into())]);
+    let close = |a: &Image, b: &Image| most_apart(a, b) < 2e-3 * mean(b);
+    assert!(close(&of(&[(SKIN, map("even.png", ""))]), &plain));
+    assert!(close(&of(&[(SKIN, map("even.png", ", channel: G, invert: true"))]), &of(&[(SKIN, "1.6".into())])));
+    assert!(!close(&plain, &of(&[(SKIN, "0.42".into())])));
+    // A map that varies lies between its extremes.
+    let (varied, deep) = (of(&[(SKIN, map("halves.png", ""))]), of(&[(SKIN, "1.6".into())]));
+    assert!(!close(&varied, &plain) && !close(&varied, &deep));
+    for (at, value) in varied.pixels.iter().enumerate() {
+        for c in 0..3 {
+            let (a, b) = (plain.pixels[at][c], deep.pixels[at][c]);
+            assert!(value[c] > 0.97 * a.min(b) && value[c] < 1.03 * a.max(b), "pixel {at}: {value:?}");
+        }
+    }
+    // A layer that ends above the one outside it is not there.
+    let over = of(&[(SKIN, "0.4".into()), (BLACK, map("even.png", ", invert: false"))]);
+    assert!(close(&over, &plain));
+    let above = of(&[(SKIN, map("even.png", ", invert: true")), (BLACK, map("even.png", ""))]);
+    assert!(close(&above, &deep));
+}
+
+#[test]
+fn what_grazes_stays_a_number_and_near_its_limit() {
+    let mut studio = studio();
+    let layers = [(SKIN, 0.4)];
+    for (ior, bend) in [(1.0, 1.0), (1.33, 1.33)] {
+        studio.write("thing.ron", material(ior, &constant(&layers), FLESH));
+        for elevation in [0.1, 1e-2, 1e-3f64] {
+            // A low sun.
+            let to_light = dvec3(1.0, elevation, 0.0).normalize();
+            let light = format!("Directional(direction: (-1, {:?}, 0), irradiance: 1, shadow: false)", -elevation);
+            let image = scattered(&mut studio, &slab(ABOVE, &light, "Layered()"));
+            let error = error(&image, ABOVE, |view| once(ior, bend, view, to_light, &layers, FLESH));
+            // Normals are known to 3e-5.
+            assert!(error < 0.01 + 5e-5 / elevation, "ior {ior}, sun at {elevation}: {error:.2e}");
+            // A low eye: the lower half of the picture sees the slab.
+            let eye = dvec3(0.0, 4.0 * elevation, 4.0);
+            let image = scattered(&mut studio, &slab(eye, SUN, "Layered()"));
+            let brightest = mean(&scattered(&mut studio, &slab(ABOVE, SUN, "Layered()")));
+            for (i, pixel) in image.pixels.iter().enumerate().filter(|(i, _)| i / SIZE.0 as usize >= 9) {
+                let view = ray(eye, i as u32 % SIZE.0, i as u32 / SIZE.0);
+                let expected = once(ior, bend, view, to_sun(), &layers, FLESH);
+                let off = (DVec3::from(pixel.map(f64::from)) - expected).abs().max_element();
+                assert!(off < 0.02 * brightest, "ior {ior}, eye at {elevation}, pixel {i}: {pixel:?}, not {expected}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_surroundings_shine_in_as_an_integral_over_them_says() {
+    let mut studio = studio();
+    let layers = [(SKIN, 0.4)];
+    for (ior, bend) in [(1.0, 1.0), (1.33, 1.33)] {
+        studio.write("thing.ron", material(ior, &constant(&layers), FLESH));
+        let image = scattered(&mut studio, &slab(ABOVE, "Environment(radiance: 1)", "Layered()"));
+        let error = error(&image, ABOVE, |view| {
+            let n = 64;
+            let cell = |i: usize| {
+                let (u, v) = (((i % n) as f64 + 0.5) / n as f64, ((i / n) as f64 + 0.5) / n as f64);
+                let (cos, phi) = (u, v * std::f64::consts::TAU);
+                let sin = (1.0 - cos * cos).sqrt();
+                once(ior, bend, view, dvec3(sin * phi.cos(), cos, sin * phi.sin()), &layers, FLESH)
+            };
+            (0..n * n).map(cell).sum::<DVec3>() * std::f64::consts::TAU / (n * n) as f64
+        });
+        assert!(error < 0.08, "ior {ior}: {error:.3}");
+    }
+}
+
+fn anew(before: &Plan, after: &Plan) -> BTreeMap<&'static str, usize> {
+    let known: BTreeSet<Key> = before.keys().collect();
+    let mut names = BTreeMap::new();
+    for step in after.steps().iter().filter(|step| !known.contains(&step.key)) {
+        *names.entry(step.name).or_insert(0) += 1;
+    }
+    names
+}
+
+#[test]
+fn an_edit_of_a_map_or_a_layer_bakes_nothing() {
+    let studio = studio();
+    studio.write("map.png", halves(51, 204));
+    let map = |channel: &str| format!("Texture(image: \"map.png\", channel: {channel}, range: (0.0, 2.0))");
+    let plan = |layers: &[(Medium, String)], scene: &str| {
+        studio.write("thing.ron", material(1.33, layers, FLESH));
+        let scene = read(&studio.write("scene.ron", format!("Scene(version: 1, {scene})")));
+        render::plan(&scene, &Look::of(&scene), &studio.session.shaders).expect("it can be planned").0
+    };
+    let scene = slab(ABOVE, SUN, "Layered()");
+    let layers = [(SKIN, map("R"))];
+    let before = plan(&layers, &scene);
+    let of = |after: Plan| anew(&before, &after);
+    // Another image: what was read of it, and the picture.
+    studio.write("map.png", halves(60, 200));
+    let edited = of(plan(&layers, &scene));
+    let names: Vec<&str> = edited.keys().copied().collect();
+    assert_eq!(names, ["frame.compose", "frame.image", "image.file", "layered.maps", "technique.layered"]);
+    studio.write("map.png", halves(51, 204));
+    assert_eq!(of(plan(&layers, &scene)), BTreeMap::new());
+    // Another density below the first layer touches no plane; one of the first layer does.
+    let thicker = Medium { sigma_s: 2.0 * SKIN.sigma_s, ..SKIN };
+    let deep = plan(&[(SKIN, map("R")), (SKIN, "1.5".into())], &scene);
+    let denser = anew(&deep, &plan(&[(SKIN, map("R")), (thicker, "1.5".into())], &scene));
+    assert!(!denser.contains_key("layered.planes") && !denser.contains_key("layered.maps"), "{denser:?}");
+    let outside = of(plan(&[(thicker, map("R"))], &scene));
+    assert!(outside.contains_key("layered.planes") && !outside.contains_key("layered.slopes"), "{outside:?}");
+    // Steps, bent rays and lamps are no business of bakes.
+    for technique in ["Layered(samples: 20)", "Layered(refract: false)", "Layered(march: Uniform)"] {
+        let made = of(plan(&layers, &slab(ABOVE, SUN, technique)));
+        assert!(
+            made.keys().all(|name| ["frame.compose", "frame.image", "technique.layered"].contains(name)),
+            "{made:?}"
+        );
+    }
+    // Without images nothing of a map is planned.
+    let plain = plan(&constant(&[(SKIN, 0.4)]), &scene);
+    assert!(plain.steps().iter().all(|step| !["layered.maps", "layered.slopes"].contains(&step.name)));
+}
