@@ -37,7 +37,7 @@
 //! | [`metric`] | how far an image is from a reference: relMSE, DSSIM, FLIP, bias, z-test; heat maps | |
 //! | [`papers`] | the bibliography; comments cite its keys | |
 //! | [`optics`] | media, Fresnel, gloss, phase functions, profiles, albedo of a half space: scalar f64, mm | |
-//! | [`geometry`] | meshes, shapes, sculptures, rays, filters on vertices | |
+//! | [`geometry`] | meshes, shapes, sculptures, rays; thickness, planes and filters on vertices | |
 //! | [`store`] | the one mechanism: keys, plans, memory, disk, the door for files and who follows them | its key is new |
 //! | [`scene`] | RON into a valid [`scene::Scene`]; the only room that knows RON | a file's content changes |
 //! | [`reference`] | the truth: light followed on the CPU, in f64; needs no device | anything that light could meet changes |

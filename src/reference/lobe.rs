@@ -1,8 +1,8 @@
 //! Lamps as they show through a refracting boundary at points inside a medium.
 //!
-//! From where the boundary most likely shows a lamp, guessed by two rays, a direction is drawn: at a rough boundary a
-//! microfacet that refracts a lamp without extent, at a smooth one a point of an area light, refracted as the boundary would
-//! were it flat. The direction is followed: whatever the guess, the lamp's light along it is exact. Paths that are scattered
+//! From where the boundary most likely shows a lamp, guessed by a ray or two, a direction is drawn: at a rough boundary
+//! a microfacet that refracts a lamp without extent, at a smooth one a point of an area light, refracted as the boundary
+//! would were it flat. The direction is followed: whatever the guess, the lamp's light along it is exact. Paths that are scattered
 //! into the lobe find the lamp too, where they leave; the two ways share the light out by the balance heuristic.
 
 use super::boundary::Facing;

@@ -23,10 +23,10 @@
 //! behind, `Beer` three times as bright as it should be with sigma_tr and a third with sigma_t, the paper's sum eight times.
 //! 4 coefficients in front are as good as 49, and more than 25 behind lower DSSIM by 2 %: the paper's claim holds there.
 //!
-//! Costs: a bake of lengths per shape (256 directions, 1024 above 5 bands; all vertices at once), and one of coefficients, which is all that an
-//! edit of the medium makes anew. Then every lamp costs its coefficients times the vertices, once: nothing of it depends on
-//! the eye. Moving and turning an object turns the lamps, and bakes nothing. The surroundings are one inner product. What
-//! deforms is baked for every picture.
+//! Costs: a bake of lengths per shape (256 directions, 1024 above 5 bands; all vertices at once), and one of coefficients,
+//! which is all that an edit of the medium makes anew. Then every lamp costs its coefficients times the vertices, once:
+//! nothing of it depends on the eye. Moving and turning an object turns the lamps, and bakes nothing. The surroundings are
+//! one inner product. What deforms is baked for every picture.
 //!
 //! Fails where light does not go straight: it spreads sideways in truth, so that the far side of a thick thing is too dark
 //! behind a thin neighbour and edges of thickness show on the surface, softened only by how few bands there are. It sees the
