@@ -146,7 +146,9 @@ fn components(corners: &[[u32; 3]], count: usize) -> Vec<u32> {
 
 fn assemble(triangles: &Intrinsic, count: usize) -> (CsMat<f64>, Vec<f64>) {
     let mut areas = vec![0.0; count];
-    let mut entries = TriMat::with_capacity((count, count), 12 * triangles.corners.len());
+    let mut entries = TriMat::with_capacity((count, count), count + 12 * triangles.corners.len());
+    // A diagonal, even of samples whose edges all return to them.
+    (0..count).for_each(|i| entries.add_triplet(i, i, 0.0));
     for (t, corners) in triangles.corners.iter().enumerate() {
         for i in 0..3 {
             areas[corners[i] as usize] += triangles.area(t) / 3.0;

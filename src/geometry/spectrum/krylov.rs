@@ -11,7 +11,7 @@
 
 use faer::{Mat, MatRef, Side};
 use glam::DVec3;
-use sprs::{CsMat, TriMat};
+use sprs::CsMat;
 
 use super::factor::{Factor, Pattern};
 use super::kernel::Kernel;
@@ -88,18 +88,16 @@ fn poles((low, high): (f64, f64)) -> Vec<f64> {
 
 /// A + S/xi.
 fn shifted(laplacian: &Laplacian, pole: f64) -> CsMat<f64> {
-    add_areas(&laplacian.stiffness.map(|w| w / pole), &laplacian.areas, 1.0)
+    add_areas(laplacian.stiffness.map(|w| w / pole), &laplacian.areas, 1.0)
 }
 
-/// A matrix with the areas, times a factor, added to its diagonal.
-pub(super) fn add_areas(matrix: &CsMat<f64>, areas: &[f64], factor: f64) -> CsMat<f64> {
-    let diagonal = TriMat::from_triplets(
-        (areas.len(), areas.len()),
-        (0..areas.len()).collect(),
-        (0..areas.len()).collect(),
-        areas.iter().map(|area| factor * area).collect(),
-    );
-    matrix + &diagonal.to_csc::<usize>()
+/// A matrix with the areas, times a factor, added to its diagonal. Entries that are 0 keep their places, or a factor's pattern
+/// would not be theirs.
+pub(super) fn add_areas(mut matrix: CsMat<f64>, areas: &[f64], factor: f64) -> CsMat<f64> {
+    for (i, area) in areas.iter().enumerate() {
+        *matrix.get_mut(i, i).expect("a Laplacian has a diagonal") += factor * area;
+    }
+    matrix
 }
 
 /// A space with the Laplacian and the field in it.
