@@ -28,7 +28,7 @@
 //!
 //! # The rooms
 //!
-//! Each room uses only rooms above it; `tests/tidy.rs` holds that order.
+//! Each room uses only rooms above it, its tests aside; `tests/tidy.rs` holds that order.
 //!
 //! | room | what it is | its values are made again when |
 //! |---|---|---|

@@ -139,7 +139,8 @@ fn none_of(wrong: Vec<String>) {
 
 #[test]
 fn rooms_use_only_rooms_to_their_left() {
-    none_of(sources().iter().flat_map(|(path, text)| disorder(path, text)).collect());
+    // Tests may look at the whole from anywhere.
+    none_of(sources().iter().flat_map(|(path, text)| disorder(path, without_tests(path, text))).collect());
     let library = std::fs::read_to_string("src/lib.rs").expect("there is a library");
     for (at, _) in library.match_indices("pub mod ") {
         let room = word(&library[at + "pub mod ".len()..]);

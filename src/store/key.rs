@@ -238,7 +238,9 @@ impl Serializer for &mut Spelling {
         self.length(25, len)?;
         Ok(self)
     }
-    fn serialize_struct(self, _: &'static str, len: usize) -> Result<Self, Unspellable> {
+    // By its name: two steps may read the same and make something else of it.
+    fn serialize_struct(self, name: &'static str, len: usize) -> Result<Self, Unspellable> {
+        self.text(26, name)?;
         self.length(26, Some(len))?;
         Ok(self)
     }
@@ -315,6 +317,14 @@ mod tests {
             Tall { height: f64 },
             Nothing,
         }
+        #[derive(serde::Serialize)]
+        struct Ends {
+            of: u32,
+        }
+        #[derive(serde::Serialize)]
+        struct Middle {
+            of: u32,
+        }
         let names = [
             Key::of(&1.0f64),
             Key::of(&1.0f32),
@@ -331,6 +341,8 @@ mod tests {
             Key::of(&Shape::Flat { width: 1.0 }),
             Key::of(&Shape::Tall { height: 1.0 }),
             Key::of(&Shape::Nothing),
+            Key::of(&Ends { of: 1 }),
+            Key::of(&Middle { of: 1 }),
             Key::of(&0.0f64),
             Key::of(&-0.0f64),
         ];

@@ -182,7 +182,7 @@ pub(super) fn gather(
     ];
     binds.extend(kernel);
     if let Some(far) = far {
-        flags.push("FAR");
+        flags.push("FAR_PART");
         binds.push(("blocks", Bind::Buffer(far)));
     }
     if let Some(before) = before {

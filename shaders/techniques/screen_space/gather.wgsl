@@ -25,7 +25,7 @@ struct Pattern {
 @group(0) @binding(5) var<storage, read> levels: array<Level>;
 @group(0) @binding(6) var<storage, read> sums: array<Sums>;
 @group(0) @binding(7) var<uniform> pattern: Pattern;
-#if FAR
+#if FAR_PART
 #include "techniques/long_range/upscale.wgsl"
 #endif
 #if ON_TOP
@@ -130,7 +130,7 @@ fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
     for (var i = 1; i <= count; i++) {
         leaving += layer(i, at.xy, surface.position);
     }
-#if FAR
+#if FAR_PART
     let block = f32(BLOCK) * dot(surface.position, camera.forward) * camera.pixel;
     leaving += far_light(position_map, pixel, surface, block);
 #endif

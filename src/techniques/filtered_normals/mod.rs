@@ -28,8 +28,8 @@
 //!
 //! Costs: the bake; after it a frame costs exactly what `Opaque` costs, with the same steps, and one pass over the
 //! vertices when the kernel is edited: that is the method's point. On the device lie two bytes per vertex and mode (at most
-//! 81 modes by Krylov; 64 MiB in all, and where that is less than there should be, modes end earlier) and 32 per vertex. A kernel that differs between channels has three normals: each light and
-//! the surroundings are then gathered three times.
+//! 81 modes by Krylov; 64 MiB in all, and where that is less than there should be, modes end earlier) and 32 per vertex. A
+//! kernel that differs between channels has three normals: each light and the surroundings are then gathered three times.
 //!
 //! Fails where light crosses the inside: thin parts stay dark against the light, as `scenes/first-light.ron` shows in the
 //! ears; and a shadow's edge stays sharp where normals are filtered and not the light. Shadows are looked up a

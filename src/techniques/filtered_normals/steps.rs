@@ -198,3 +198,25 @@ impl Step for KernelWeights {
         Ok(Buffer::new(run.host::<Gpu>(), bytemuck::cast_slice(&table)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn modes_lie_two_halves_to_a_word() {
+        let (samples, modes) = (130, 5);
+        let columns: Vec<f32> = (0..samples * modes).map(|i| (1.3 * i as f32).sin()).collect();
+        let words = halves(&columns, samples);
+        assert_eq!(words.len(), stride(samples) * 3);
+        for (k, column) in columns.chunks(samples).enumerate() {
+            for (i, value) in column.iter().enumerate() {
+                let bits = words[k / 2 * stride(samples) + i] >> (16 * (k % 2));
+                assert_eq!(f16::from_bits(bits as u16), f16::from_f32(*value), "mode {k}, sample {i}");
+            }
+        }
+        // What has no mode or no sample is 0.
+        assert!((0..stride(samples)).all(|i| words[2 * stride(samples) + i] >> 16 == 0));
+        assert!((0..3).all(|p| (samples..stride(samples)).all(|i| words[p * stride(samples) + i] == 0)));
+    }
+}

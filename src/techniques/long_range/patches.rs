@@ -1,9 +1,9 @@
 //! The surface cut into patches, each of which sends its light as one splat.
 //!
-//! The mesh is decimated, and every vertex belongs to the coarse triangle that lies nearest to it, and to the side it faces. A triangle of the mesh
-//! belongs to the group of its first vertex: pixels can tell that group, so that what the camera sees of it can be taken
-//! away. A patch is all of a group, but for triangles that are longer than patches should be: those are halved until they
-//! are not [Maisch2020, section 8.1], and each piece is a patch of the same group.
+//! The mesh is decimated, and every vertex belongs to the coarse triangle that lies nearest to it, and to the side it
+//! faces. A triangle of the mesh belongs to the group of its first vertex: pixels can tell that group, so that what the
+//! camera sees of it can be taken away. A patch is all of a group, but for triangles that are longer than patches should
+//! be: those are halved until they are not [Maisch2020, section 8.1], and each piece is a patch of the same group.
 //!
 //! All of it is baked for the shape at rest, as vertex numbers and barycentric coordinates, and holds however it deforms.
 

@@ -18,10 +18,10 @@
 //! some 20 ms.
 //!
 //! Fails where light enters that the camera does not see: objects lit from behind stay dark, and what leaves the picture
-//! takes its light along. `scenes/long-range/back-lit.ron` shows it. Where one part of an object stands before another, cells
-//! hold both, and light leaks between them. A plate that is seen at 45 degrees comes out 4 % too bright and at 69
-//! degrees 43 %, since a disk stands for the ellipse that a pixel covers. A spot of light smaller than a cell is spread over all of it: far away, where the
-//! profile is steep, too much arrives.
+//! takes its light along. `scenes/long-range/back-lit.ron` shows it. Where one part of an object stands before another,
+//! cells hold both, and light leaks between them. A plate that is seen at 45 degrees comes out 4 % too bright and at 69
+//! degrees 43 %, since a disk stands for the ellipse that a pixel covers. A spot of light smaller than a cell is spread
+//! over all of it: far away, where the profile is steep, too much arrives.
 //!
 //! ```
 //! use diaphane::scene::TechniqueText;
