@@ -21,7 +21,7 @@ fn wax(studio: &Studio, filter: &str) {
 
 /// A sphere of radius 20 mm.
 fn sphere(studio: &mut Studio, lights: &str, technique: &str) -> Arc<Image> {
-    studio.picture(&format!(
+    studio.scattered(&format!(
         "mm_per_unit: 10, camera: (eye: (0, 0, 9), target: (0, 0, 0), fov_y_deg: 30), lights: [{lights}],
          objects: [(mesh: Sphere(radius: 2, subdivisions: 4), material: \"wax.ron\")],
          view: (technique: {technique}, size: (48, 48), antialias: 1)"

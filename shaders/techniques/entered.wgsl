@@ -4,6 +4,7 @@
 #include "frame/surface.wgsl"
 #include "frame/entering.wgsl"
 #include "frame/lights.wgsl"
+#include "techniques/pixel_area.wgsl"
 
 @group(0) @binding(0) var<uniform> camera: Camera;
 @group(0) @binding(1) var<storage, read> objects: array<Object>;
@@ -56,17 +57,6 @@ fn vertex(
     out.patch_group = patch_group;
 #endif
     return out;
-}
-
-// Pixels that see the surface at a steeper angle stand for none of it: few of them would stand for much.
-const STEEPEST: f32 = 0.1;
-
-fn pixel_area(point: vec3f, flat_normal: vec3f) -> f32 {
-    let distance = length(point);
-    let depth = dot(point, camera.forward);
-    let facing = abs(dot(point, flat_normal)) / distance;
-    let across = depth * camera.pixel;
-    return select(0.0, across * across * (depth / distance) / facing, facing > STEEPEST);
 }
 
 struct Entered {

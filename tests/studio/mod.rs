@@ -5,7 +5,7 @@
 use diaphane::gpu::how_to_get_an_adapter;
 use diaphane::image::{Display, Format, Image};
 use diaphane::render::{self, Look};
-use diaphane::scene::{Reader, Scene};
+use diaphane::scene::{Part, Reader, Scene};
 use diaphane::session::{Options, Session};
 use diaphane::store::{Files, Plan, Watch};
 use std::path::PathBuf;
@@ -55,6 +55,14 @@ impl Studio {
 
     pub fn shoot(&mut self, scene: &Scene, look: &Look) -> (Plan, Arc<Image>) {
         self.session.render(scene, look, &Nobody).unwrap_or_else(|problem| panic!("{problem}"))
+    }
+
+    /// The scattered light of a text's picture, without the sky behind things.
+    pub fn scattered(&mut self, text: &str) -> Arc<Image> {
+        let scene = self.scene(text);
+        let mut look = Look::of(&scene);
+        look.view.part = Part::Scattered;
+        self.shoot(&scene, &look).1
     }
 
     /// The picture of a text.

@@ -14,7 +14,7 @@ struct Whose {
 @group(0) @binding(4) var<storage, read> areas: array<f32>;
 @group(0) @binding(5) var<storage, read_write> seen: array<atomic<u32>>;
 
-// What stands for all of a group; sixteen times as much fits.
+// What stands for all of a group; sixteen times as much fits. Of a group that is smaller than a pixel nobody asks.
 const ALL: f32 = 268435456.0;
 
 @compute @workgroup_size(64)

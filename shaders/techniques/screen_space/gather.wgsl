@@ -34,7 +34,32 @@ struct Pattern {
 
 const PI: f32 = 3.14159265358979;
 
-fn inner(pixel: vec2i, x: vec3f) -> vec3f {
+// How far light goes to the surface at `x`, on from a piece of surface of a radius `a` if it were a disk. A square of
+// pixels on a surface that is seen at an angle covers an ellipse, as does the one beside it, and the two do not overlap:
+// near the piece the distance is measured by its axes. `along` is the ellipse's long axis, `facing` what it is short of.
+struct Tilt {
+    along: vec3f,
+    facing: f32,
+}
+
+fn tilt(x: vec3f, flat_normal: vec3f) -> Tilt {
+    let view = normalize(x);
+    let facing = clamp(abs(dot(view, flat_normal)), 0.1, 1.0);
+    let along = view - flat_normal * dot(view, flat_normal);
+    let size = length(along);
+    return Tilt(select(vec3f(0.0), along / size, size > 1e-3), facing);
+}
+
+fn distance_to_piece(offset: vec3f, a: f32, tilt: Tilt) -> f32 {
+    let squared = dot(offset, offset);
+    let along = dot(offset, tilt.along);
+    let across = max(0.0, squared - along * along);
+    let by_axes = along * along * tilt.facing + across / tilt.facing;
+    let nearness = a * a / max(a * a + squared, 1e-30 * a);
+    return sqrt(max(0.0, squared + nearness * (by_axes - squared)));
+}
+
+fn inner(pixel: vec2i, x: vec3f, tilt: Tilt) -> vec3f {
     var sum = vec3f(0.0);
     let size = vec2i(textureDimensions(position_map));
     let width = 2 * pattern.n + 1;
@@ -48,7 +73,8 @@ fn inner(pixel: vec2i, x: vec3f) -> vec3f {
         if u32(position.w) != pattern.object + 1u || entered.a == 0.0 {
             continue;
         }
-        sum += entered.a * entered.rgb * disk_mean(distance(position.xyz, x), sqrt(entered.a / PI));
+        let a = sqrt(entered.a / PI);
+        sum += entered.a * entered.rgb * disk_mean(distance_to_piece(position.xyz - x, a, tilt), a);
     }
     return sum;
 }
@@ -80,7 +106,7 @@ fn over_cell(center: vec2f, cell: f32) -> Sums {
 }
 
 // One layer: the cells on the rim of a square of n_l x n_l.
-fn layer(i: i32, middle: vec2f, x: vec3f) -> vec3f {
+fn layer(i: i32, middle: vec2f, x: vec3f, tilt: Tilt) -> vec3f {
     let inside = f32(pattern.n_l - 2);
     let half_width = 0.5 * f32(2 * pattern.n + 1) * pow(f32(pattern.n_l) / inside, f32(i - 1));
     let cell = 2.0 * half_width / inside;
@@ -99,7 +125,8 @@ fn layer(i: i32, middle: vec2f, x: vec3f) -> vec3f {
         let seen_there = over_cell(middle + offset, cell);
         if seen_there.area > 0.0 {
             let place = seen_there.place / seen_there.area;
-            sum += seen_there.light * disk_mean(distance(place, x), sqrt(seen_there.area / PI));
+            let a = sqrt(seen_there.area / PI);
+            sum += seen_there.light * disk_mean(distance_to_piece(place - x, a, tilt), a);
         }
     }
     return sum * select(1.0, sqrt(f32(i)), pattern.brighten == 1u);
@@ -125,10 +152,11 @@ fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
     if surface.object != i32(pattern.object) {
         return vec4f(radiance, 1.0);
     }
-    var leaving = inner(pixel, surface.position);
+    let tilt = tilt(surface.position, surface.flat_normal);
+    var leaving = inner(pixel, surface.position, tilt);
     let count = layers_needed(dot(surface.position, camera.forward));
     for (var i = 1; i <= count; i++) {
-        leaving += layer(i, at.xy, surface.position);
+        leaving += layer(i, at.xy, surface.position, tilt);
     }
 #if FAR_PART
     let block = f32(BLOCK) * dot(surface.position, camera.forward) * camera.pixel;

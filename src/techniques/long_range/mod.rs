@@ -144,6 +144,8 @@ fn far(
             ("normals", Bind::Buffer(normals)),
             ("irradiance", Bind::Buffer(irradiance)),
             ("seen", Bind::Buffer(seen)),
+            ("camera", surface.camera()),
+            ("position_map", surface.position()),
         ],
     });
 

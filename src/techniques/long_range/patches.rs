@@ -97,22 +97,33 @@ fn cut(mesh: &Mesh, wanted: u32) -> Patches {
     patches
 }
 
+/// Steps of the grid on which a mesh is decimated, along its longest side.
+const GRID: f64 = 65536.0;
+
 /// Each vertex's coarse triangle and the side that it faces, numbered as they come, and how many there are.
 fn groups(mesh: &Mesh, wanted: u32) -> (Vec<u32>, u32) {
     let weld = weld(&mesh.positions);
     let indices: Vec<u32> = mesh.triangles.iter().flatten().map(|&v| weld[v as usize]).collect();
-    let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| p.to_array()).collect();
+    // On a grid, so that ties are settled alike whatever the size and the place of the mesh.
+    let low = mesh.positions.iter().copied().fold(Vec3::MAX, Vec3::min).as_dvec3();
+    let high = mesh.positions.iter().copied().fold(Vec3::MIN, Vec3::max).as_dvec3();
+    let steps = GRID / (high - low).max_element();
+    let on_grid: Vec<Vec3> = mesh.positions.iter().map(|p| ((p.as_dvec3() - low) * steps).round().as_vec3()).collect();
+    let positions: Vec<[f32; 3]> = on_grid.iter().map(|p| p.to_array()).collect();
     let options = SimplifyOptions::Regularize | SimplifyOptions::Prune;
     let coarse = meshopt::simplify_decoder(&indices, &positions, 3 * wanted as usize, 1.0, options, None);
     let triangles: Vec<[u32; 3]> = coarse.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
-    let coarse = Mesh { positions: mesh.positions.clone(), triangles, ..Mesh::default() };
+    let coarse = Mesh { positions: on_grid.clone(), triangles, ..Mesh::default() };
     let nearest = Nearest::new(&coarse);
     // Vertices at one place may belong to several sides of an edge, and those to several of a thin sheet: what is seen of
     // one side says nothing of the other.
-    let side = |normal: Vec3| (normal.abs().max_position(), normal[normal.abs().max_position()] < 0.0);
+    let side = |normal: Vec3| {
+        let rounded = (1024.0 * normal).round();
+        let axis = rounded.abs().max_position();
+        (axis, rounded[axis] < 0.0)
+    };
     let mut numbers = HashMap::new();
-    let of_vertex = mesh
-        .positions
+    let of_vertex = on_grid
         .iter()
         .zip(&mesh.normals)
         .map(|(p, normal)| {
