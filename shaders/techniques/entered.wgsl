@@ -89,7 +89,7 @@ fn fragment(in: Vertex) -> Entered {
 #endif
     let flat_normal = unpack_direction(textureLoad(packed_map, pixel, 0).y);
     var out: Entered;
-    out.light = vec4f(entered, pixel_area(in.position, flat_normal));
+    out.light = vec4f(entered, pixel_area(camera, in.position, flat_normal));
 #if PATCHES
     out.patch_group = in.patch_group;
 #endif

@@ -87,7 +87,7 @@ impl Booth {
         let shot = take(&input.stage)?;
         let kept = match &input.law {
             Law::Sound => Ok(format!("{} numbers", shot.numbers)),
-            Law::White => laws::no_more_than_white(&shot),
+            Law::White => laws::no_more_than_white(&shot, &column.name),
             Law::SameAs(other) => laws::times(&shot, 1.0, &take(other)?),
             Law::NearlySameAs(other) => laws::nearly(&shot, &take(other)?),
             Law::SumOf(one, other) => laws::sum(&shot, &take(one)?, &take(other)?),

@@ -45,7 +45,7 @@ fn is_seen(place: vec3f, radius: f32) -> f32 {
 
 // How much of a patch the camera sees: 0 to 1, or a little more.
 fn share_seen(group: u32, area: f32, place: vec3f, normal: vec3f) -> f32 {
-    let pixel = pixel_area(place, normal);
+    let pixel = pixel_area(camera, place, normal);
     if dot(place, normal) >= 0.0 || pixel == 0.0 {
         return f32(seen[group]) / ALL;
     }

@@ -39,6 +39,7 @@ const RESIDUAL: f64 = 1e-6;
 /// The modes of a field at the samples up to the frequency `cut` (rad per edge), and where they end: a little above, so
 /// that no repeated eigenvalue is cut, or far below if there is no room for more.
 pub fn modes(laplacian: &Laplacian, field: &[DVec3], cut: f64, tick: Tick) -> Result<(Modes, f64), Problem> {
+    super::on_one_thread();
     let n = laplacian.samples();
     let (lambda, columns, reached) = match n <= SMALL {
         true => whole(laplacian, cut * cut)?,

@@ -30,6 +30,7 @@ const CHECK: usize = 2;
 /// The modes of a field at the samples, for kernels whose knees lie in `band`, rad per edge; and by how much kernels still
 /// changed at the last check.
 pub fn modes(laplacian: &Laplacian, field: &[DVec3], band: (f64, f64), tick: Tick) -> Result<(Modes, f64), Problem> {
+    super::on_one_thread();
     let mut space = Projected::new(laplacian, field);
     let band = within(band, laplacian);
     // Nothing, if all is constant; else unknown until two spaces were compared.

@@ -225,6 +225,12 @@ pub fn all_harmonics(mesh: &Mesh, highest: f64, tick: Tick) -> Result<Harmonics,
     })
 }
 
+/// Sums in an order that no number of threads changes; and threads that wait for each other in a loop would take the time
+/// of whatever else is baked.
+fn on_one_thread() {
+    faer::set_global_parallelism(faer::Par::Seq);
+}
+
 /// Numbers in all modes together, at most: 64 MiB as halves on a device, four times that while they are made.
 const MOST: usize = 1 << 25;
 

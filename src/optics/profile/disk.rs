@@ -129,7 +129,7 @@ impl DiskMeans {
     pub fn new(profiles: &[Profile; 3]) -> DiskMeans {
         let first = 2e-4f64.ln();
         let radius = |share: f64| profiles.each_ref().map(|profile| profile.sample(1.0 - share).unwrap_or(0.0));
-        let last = radius(1e-7).into_iter().fold(10.0, f64::max).min(1e4).ln();
+        let last = radius(1e-7).into_iter().fold(10.0, f64::max).min(1e14).ln();
         let rows = ((last - first) / STEP).ceil() as usize + 1;
         let step = STEP / FINE as f64;
         let lists: Vec<(Vec<f64>, Vec<f64>)> = profiles
