@@ -23,7 +23,7 @@ fn wax(studio: &Studio, filter: &str) {
 fn sphere(studio: &mut Studio, lights: &str, technique: &str) -> Arc<Image> {
     studio.scattered(&format!(
         "mm_per_unit: 10, camera: (eye: (0, 0, 9), target: (0, 0, 0), fov_y_deg: 30), lights: [{lights}],
-         objects: [(mesh: Sphere(radius: 2, subdivisions: 4), material: \"wax.ron\")],
+         objects: [(mesh: Sphere(radius: 2, subdivisions: 3), material: \"wax.ron\")],
          view: (technique: {technique}, size: (48, 48), antialias: 1)"
     ))
 }
@@ -49,7 +49,7 @@ fn a_sphere_is_dimmed_by_the_weight_of_its_frequency_channel_by_channel() {
         for lights in [SUN, SKY] {
             let plain = sphere(&mut studio, lights, "Opaque()");
             let found = sphere(&mut studio, lights, &format!("FilteredNormals(engine: {engine})"));
-            let limit = 4e-3 * mean(&plain).max(0.1);
+            let limit = 6e-3 * mean(&plain).max(0.1);
             for (a, b) in found.pixels.iter().zip(&plain.pixels) {
                 for c in 0..3 {
                     let apart = (a[c] as f64 - expected[c] * b[c] as f64).abs();
@@ -83,20 +83,20 @@ fn even_light_stays_as_it_is_when_light_is_filtered() {
     let found = sphere(&mut studio, SUN, "FilteredNormals(signal: Irradiance)");
     // Light at vertices and light at pixels differ by what lies between vertices.
     assert!(most_apart(&found, &plain) < 0.03, "{}", most_apart(&found, &plain));
-    wax(&studio, "Gaussian(width: 10)");
+    wax(&studio, "Gaussian(width: 20)");
     let wide = sphere(&mut studio, SUN, "FilteredNormals(signal: Irradiance)");
     assert!(most_apart(&wide, &plain) > 0.1, "a wide one does not");
 }
 
-/// A plate in the sun, 80 mm wide, with a bar's shadow across it, from above.
-fn shaded(studio: &mut Studio, technique: &str) -> Vec<f64> {
+/// A plate in the sun, 80 mm wide, with a bar's shadow across it if the bar hangs over it, from above.
+fn shaded(studio: &mut Studio, technique: &str, bar: f64) -> Vec<f64> {
     let image = studio.picture(&format!(
         "mm_per_unit: 10, camera: (eye: (0, 20, 0), target: (0, 0, 0), up: (0, 0, -1), fov_y_deg: 20),
          lights: [Directional(direction: (0.5, -1, 0), irradiance: 3)],
          objects: [
             (name: \"plate\", mesh: Slab(size: (8, 8, 1), segments: (32, 32)), material: \"wax.ron\",
              transform: (translate: (0, -0.5, 0), rotate_deg: (-90, 0, 0))),
-            (name: \"bar\", mesh: Box(size: (2, 0.1, 20)), material: \"wax.ron\", transform: (translate: (-6, 10, 0)))],
+            (name: \"bar\", mesh: Box(size: (2, 0.1, 20)), material: \"wax.ron\", transform: (translate: ({bar:?}, 10, 0)))],
          view: (technique: {technique}, size: (64, 64), antialias: 1)"
     ));
     (0..64).map(|x| image.at(x, 32)[0] as f64).collect()
@@ -107,13 +107,18 @@ fn light_spreads_over_the_edge_of_a_shadow_and_none_is_lost() {
     let mut studio = studio();
     wax(&studio, "Gaussian(width: 10)");
     let steepest = |row: &[f64]| row.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
-    let sharp = shaded(&mut studio, "Opaque()");
-    let soft = shaded(&mut studio, "FilteredNormals(signal: Irradiance)");
-    let normals = shaded(&mut studio, "FilteredNormals()");
+    let sharp = shaded(&mut studio, "Opaque()", -6.0);
+    let soft = shaded(&mut studio, "FilteredNormals(signal: Irradiance)", -6.0);
+    let normals = shaded(&mut studio, "FilteredNormals()", -6.0);
     println!("steepest: {:.3} {:.3} {:.3}", steepest(&sharp), steepest(&soft), steepest(&normals));
     assert!(steepest(&sharp) > 0.2, "{}", steepest(&sharp));
     assert!(steepest(&soft) < 0.35 * steepest(&sharp), "light spreads: {}", steepest(&soft));
     assert!(steepest(&normals) > 0.7 * steepest(&sharp), "normals do not: {}", steepest(&normals));
+    // Away from shadows and edges there is nothing to spread.
+    let even = shaded(&mut studio, "FilteredNormals(signal: Irradiance)", -90.0);
+    let flat = shaded(&mut studio, "Opaque()", -90.0);
+    println!("{even:.3?} {flat:.3?}");
+    assert!(even[24..40].iter().zip(&flat[24..40]).all(|(a, b)| (a / b - 1.0).abs() < 0.01));
     let sum = |row: &[f64]| row.iter().sum::<f64>();
     assert!((sum(&soft) / sum(&sharp) - 1.0).abs() < 0.15, "{} {}", sum(&soft), sum(&sharp));
 }

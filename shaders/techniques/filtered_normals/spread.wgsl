@@ -7,10 +7,9 @@ const NOWHERE: u32 = 0xffffffffu;
 // The sample of each vertex.
 @group(0) @binding(0) var<storage, read> vertices: array<u32>;
 @group(0) @binding(1) var<storage, read> modes: array<u32>;
-@group(0) @binding(2) var<storage, read> areas: array<f32>;
-@group(0) @binding(3) var<storage, read> coefficients: array<vec4f>;
-@group(0) @binding(4) var<storage, read> irradiance: array<vec4f>;
-@group(0) @binding(5) var<storage, read_write> filtered: array<vec4f>;
+@group(0) @binding(2) var<storage, read> coefficients: array<vec4f>;
+@group(0) @binding(3) var<storage, read> irradiance: array<vec4f>;
+@group(0) @binding(4) var<storage, read_write> filtered: array<vec4f>;
 
 @compute @workgroup_size(64)
 fn compute(@builtin(global_invocation_id) id: vec3u) {
@@ -24,9 +23,10 @@ fn compute(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let count = arrayLength(&coefficients) - 1u;
-    let stride = arrayLength(&areas);
+    let pairs = (count + 1u) / 2u;
+    let stride = arrayLength(&modes) / pairs;
     var sum = coefficients[0].rgb * irradiance[sample].rgb;
-    for (var p = 0u; p < (count + 1u) / 2u; p++) {
+    for (var p = 0u; p < pairs; p++) {
         let values = unpack2x16float(modes[p * stride + sample]);
         sum += values.x * coefficients[2u * p + 1u].rgb;
         // The last pair may be half of one.

@@ -72,13 +72,7 @@ pub(super) fn filtered(
         ("filtered", 16),
         vertices,
         4,
-        &[
-            ("vertices", vertices),
-            ("modes", modes),
-            ("areas", areas),
-            ("coefficients", coefficients),
-            ("irradiance", irradiance),
-        ],
+        &[("vertices", vertices), ("modes", modes), ("coefficients", coefficients), ("irradiance", irradiance)],
     )
 }
 
