@@ -9,7 +9,7 @@ use diaphane::render::{self, Look};
 use diaphane::store::{Key, Plan};
 use glam::{DVec3, dvec3};
 use std::collections::{BTreeMap, BTreeSet};
-use studio::{Studio, mean, most_apart, read, studio};
+use studio::{mean, most_apart, read, studio};
 
 /// One medium, 1/mm, with its phase function's own parameter.
 #[derive(Clone, Copy)]
@@ -120,13 +120,6 @@ fn error(image: &Image, eye: DVec3, expected: impl Fn(DVec3) -> DVec3) -> f64 {
     worst
 }
 
-fn scattered(studio: &mut Studio, text: &str) -> std::sync::Arc<Image> {
-    let scene = studio.scene(text);
-    let mut look = Look::of(&scene);
-    look.view.part = diaphane::frame::Part::Scattered;
-    studio.shoot(&scene, &look).1
-}
-
 const ABOVE: DVec3 = dvec3(0.5, 4.0, 3.0);
 const SUN: &str = "Directional(direction: (-1, -2, -0.5), irradiance: 1, shadow: false)";
 
@@ -143,10 +136,8 @@ fn a_stack_of_layers_has_its_closed_form_in_few_steps() {
             studio.write("thing.ron", material(ior, &constant(layers), FLESH));
             let bend = if refract { ior } else { 1.0 };
             for samples in [1, 5] {
-                let image = scattered(
-                    &mut studio,
-                    &slab(ABOVE, SUN, &format!("Layered(samples: {samples}, refract: {refract})")),
-                );
+                let image =
+                    studio.scattered(&slab(ABOVE, SUN, &format!("Layered(samples: {samples}, refract: {refract})")));
                 let error = error(&image, ABOVE, |view| once(ior, bend, view, to_sun(), layers, FLESH));
                 assert!(
                     error < 3e-3,
@@ -159,7 +150,7 @@ fn a_stack_of_layers_has_its_closed_form_in_few_steps() {
     // Teeth: another depth, another phase function, another index.
     let layers = [(SKIN, 0.4)];
     studio.write("thing.ron", material(1.33, &constant(&layers), FLESH));
-    let image = scattered(&mut studio, &slab(ABOVE, SUN, "Layered()"));
+    let image = studio.scattered(&slab(ABOVE, SUN, "Layered()"));
     let other = Medium { phase: Phase::Schlick, ..SKIN };
     assert!(error(&image, ABOVE, |view| once(1.33, 1.33, view, to_sun(), &[(SKIN, 0.42)], FLESH)) > 5e-3);
     assert!(error(&image, ABOVE, |view| once(1.33, 1.33, view, to_sun(), &[(other, 0.4)], FLESH)) > 5e-3);
@@ -172,7 +163,7 @@ fn the_papers_steps_get_there_slowly_and_steps_in_closed_form_at_once() {
     let layers = [(SKIN, 0.3), (FLESH, 0.8)];
     studio.write("thing.ron", material(1.33, &constant(&layers), SKIN));
     let mut of = |technique: &str| {
-        let image = scattered(&mut studio, &slab(ABOVE, SUN, technique));
+        let image = studio.scattered(&slab(ABOVE, SUN, technique));
         error(&image, ABOVE, |view| once(1.33, 1.33, view, to_sun(), &layers, SKIN))
     };
     let uniform = [10, 50, 100, 800].map(|n| of(&format!("Layered(march: Uniform, samples: {n})")));
@@ -190,7 +181,7 @@ fn layers_that_are_none_change_nothing() {
         view: (technique: Layered(), size: (32, 32), antialias: 1)"#;
     let mut of = |layers: &[(Medium, f64)], below: Medium| {
         studio.write("thing.ron", material(1.4, &constant(layers), below));
-        scattered(&mut studio, ball)
+        studio.scattered(ball)
     };
     // One medium in any number of layers is that medium, but for where its steps end.
     let whole = of(&[], SKIN);
@@ -226,7 +217,7 @@ fn maps_say_where_layers_end() {
     let scene = slab(ABOVE, SUN, "Layered()");
     let mut of = |layers: &[(Medium, String)]| {
         studio.write("thing.ron", material(1.33, layers, FLESH));
-        scattered(&mut studio, &scene)
+        studio.scattered(&scene)
     };
     let map = |image: &str, more: &str| format!("Texture(image: \"{image}\", range: (0.0, 2.0){more})");
     let plain = of(&[(SKIN, "0.4".into())]);
@@ -260,14 +251,14 @@ fn what_grazes_stays_a_number_and_near_its_limit() {
             // A low sun.
             let to_light = dvec3(1.0, elevation, 0.0).normalize();
             let light = format!("Directional(direction: (-1, {:?}, 0), irradiance: 1, shadow: false)", -elevation);
-            let image = scattered(&mut studio, &slab(ABOVE, &light, "Layered()"));
+            let image = studio.scattered(&slab(ABOVE, &light, "Layered()"));
             let error = error(&image, ABOVE, |view| once(ior, bend, view, to_light, &layers, FLESH));
             // Normals are known to 3e-5.
             assert!(error < 0.01 + 5e-5 / elevation, "ior {ior}, sun at {elevation}: {error:.2e}");
             // A low eye: the lower half of the picture sees the slab.
             let eye = dvec3(0.0, 4.0 * elevation, 4.0);
-            let image = scattered(&mut studio, &slab(eye, SUN, "Layered()"));
-            let brightest = mean(&scattered(&mut studio, &slab(ABOVE, SUN, "Layered()")));
+            let image = studio.scattered(&slab(eye, SUN, "Layered()"));
+            let brightest = mean(&studio.scattered(&slab(ABOVE, SUN, "Layered()")));
             for (i, pixel) in image.pixels.iter().enumerate().filter(|(i, _)| i / SIZE.0 as usize >= 9) {
                 let view = ray(eye, i as u32 % SIZE.0, i as u32 / SIZE.0);
                 let expected = once(ior, bend, view, to_sun(), &layers, FLESH);
@@ -284,7 +275,7 @@ fn the_surroundings_shine_in_as_an_integral_over_them_says() {
     let layers = [(SKIN, 0.4)];
     for (ior, bend) in [(1.0, 1.0), (1.33, 1.33)] {
         studio.write("thing.ron", material(ior, &constant(&layers), FLESH));
-        let image = scattered(&mut studio, &slab(ABOVE, "Environment(radiance: 1)", "Layered()"));
+        let image = studio.scattered(&slab(ABOVE, "Environment(radiance: 1)", "Layered()"));
         let error = error(&image, ABOVE, |view| {
             let n = 64;
             let cell = |i: usize| {

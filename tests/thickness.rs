@@ -18,14 +18,12 @@ fn wax() -> Medium {
 /// What a technique scatters of a lamp of irradiance 1 that shines along `direction`; 10 mm a unit.
 fn scattered(studio: &mut Studio, technique: &str, objects: &str, direction: &str) -> Image {
     studio.write("wax.ron", WAX);
-    let scene = studio.scene(&format!(
+    let image = studio.scattered(&format!(
         "mm_per_unit: 10.0, camera: (eye: (0, 0, 40), target: (0, 0, 0), fov_y_deg: 4),
          lights: [Directional(name: \"lamp\", direction: {direction}, irradiance: 1)],
          objects: [{objects}], view: (technique: {technique}, size: (48, 48), antialias: 1)"
     ));
-    let mut look = diaphane::render::Look::of(&scene);
-    look.view.part = diaphane::scene::Part::Scattered;
-    studio.shoot(&scene, &look).1.as_ref().clone()
+    image.as_ref().clone()
 }
 
 fn middle(image: &Image) -> Rgb {
