@@ -8,8 +8,8 @@
 //!
 //! What counts where differs from the paper's criteria [eqs. 2, 3, 8], which lose what faces the camera but is hidden or out
 //! of the picture, and count twice what is seen at a steep angle. Here the pixels' areas are added up for each patch, and
-//! the patch counts for what is left of its own: together the two parts have every piece of the surface exactly once, from
-//! any place. The distance to a disk [eq. 9] is replaced as well: an even slab comes out right whether its patches are small
+//! the patch counts for what is left of its own: together the two parts have every piece of the surface once, from
+//! any place. Of a patch less than some ten pixels wide that sum says little: its middle is looked up in the picture. The distance to a disk [eq. 9] is replaced as well: an even slab comes out right whether its patches are small
 //! or not, where the paper's rule makes it several times too bright.
 //!
 //! - `splats` is about how many patches there are; more make shadows that are seen through the object sharper.
@@ -24,7 +24,7 @@
 //! Fails where the profile does: light is taken to cross the inside of things as if they were flat and endless, so thin
 //! parts come out too dark, and hollow ones glow. `scenes/long-range/back-lit.ron` shows it against `volume`. Shadows that
 //! are seen through a thing are as coarse as its patches. Of a patch that the picture's rim cuts, what is not seen still lies
-//! at its middle: near enough to a surface that a patch fills the picture, it comes out a tenth too bright.
+//! at its middle: near enough to a surface that a patch fills the picture, it comes out a tenth to a quarter too bright.
 //!
 //! ```
 //! use diaphane::scene::TechniqueText;
