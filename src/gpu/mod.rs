@@ -37,7 +37,8 @@ pub struct Images(pub Vec<Texture>);
 /// Bytes on the device.
 pub struct Buffer {
     pub buffer: wgpu::Buffer,
-    /// How many of them are content; the buffer itself may be longer.
+    /// How many of them are content; the buffer itself may be longer, and what a shader's `arrayLength` says is rounded up
+    /// and, where vertices may lie in it, a word more.
     pub bytes: u64,
     /// Which 4-byte words of an element are floats, where a shader made it.
     is_float: Option<Vec<bool>>,

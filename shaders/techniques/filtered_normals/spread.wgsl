@@ -24,6 +24,7 @@ fn compute(@builtin(global_invocation_id) id: vec3u) {
     }
     let count = arrayLength(&coefficients) - 1u;
     let pairs = (count + 1u) / 2u;
+    // Not the length of the areas: of a buffer that may hold vertices, too, it counts a word that is not there.
     let stride = arrayLength(&modes) / pairs;
     var sum = coefficients[0].rgb * irradiance[sample].rgb;
     for (var p = 0u; p < pairs; p++) {
