@@ -6,11 +6,12 @@
 //! patch has its middle, normal, area and the irradiance that enters it, shadows included, and sends its light as a disk
 //! to one pixel of each 4 x 4. A cubic spline, kept from leaking over edges by depth, brings it to all of them.
 //!
-//! What counts where differs from the paper's criteria [eqs. 2, 3, 8], which lose what faces the camera but is hidden or out
-//! of the picture, and count twice what is seen at a steep angle. Here the pixels' areas are added up for each patch, and
-//! the patch counts for what is left of its own: together the two parts have every piece of the surface once, from
-//! any place. Of a patch less than some ten pixels wide that sum says little: its middle is looked up in the picture. The distance to a disk [eq. 9] is replaced as well: an even slab comes out right whether its patches are small
-//! or not, where the paper's rule makes it several times too bright.
+//! What counts where differs from the paper's criteria [eqs. 2, 3, 8], which lose what faces the camera but is hidden
+//! or out of the picture, and count twice what is seen at a steep angle. Here the pixels' areas are added up for each
+//! patch, and the patch counts for what is left of its own: together the two parts have every piece of the surface
+//! once, from any place. Of a patch less than some ten pixels wide that sum says little: its middle is looked up in
+//! the picture. The distance to a disk [eq. 9] is replaced as well: an even slab comes out right whether its patches
+//! are small or not, where the paper's rule makes it several times too bright.
 //!
 //! - `splats` is about how many patches there are; more make shadows that are seen through the object sharper.
 //! - `n`, `n_l`, `layers` and `brighten` are those of `ScreenSpace`.
