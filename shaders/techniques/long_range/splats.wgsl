@@ -1,7 +1,8 @@
 // One splat per patch, in the patches' order: middle, normal and irradiance are means over its leaves by area. Of its area
 // counts what the camera does not see, be it hidden, off the picture, too steep or turned away, so that the screen part
 // and the far part together count every piece once. Pixels at its rim may count more than there is: then the rest is
-// negative, and takes it back.
+// negative, and takes it back. What is within the noise of counting pixels is nothing; and of a patch of few pixels that
+// count says little: there its middle is looked up.
 
 #include "lib/element.wgsl"
 #include "frame/scene.wgsl"

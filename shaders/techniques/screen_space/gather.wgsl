@@ -5,6 +5,7 @@
 #include "frame/surface.wgsl"
 #include "optics/fresnel.wgsl"
 #include "techniques/kernel.wgsl"
+#include "techniques/pixel_area.wgsl"
 #include "techniques/screen_space/levels.wgsl"
 
 struct Pattern {
@@ -34,9 +35,8 @@ struct Pattern {
 
 const PI: f32 = 3.14159265358979;
 
-// How far light goes to the surface at `x`, on from a piece of surface of a radius `a` if it were a disk. A square of
-// pixels on a surface that is seen at an angle covers an ellipse, as does the one beside it, and the two do not overlap:
-// near the piece the distance is measured by its axes. `along` is the ellipse's long axis, `facing` what it is short of.
+// A square of pixels covers an ellipse of a surface that is seen at an angle: the direction of its long axis, and its
+// short axis over its long one.
 struct Tilt {
     along: vec3f,
     facing: f32,
@@ -44,18 +44,20 @@ struct Tilt {
 
 fn tilt(x: vec3f, flat_normal: vec3f) -> Tilt {
     let view = normalize(x);
-    let facing = clamp(abs(dot(view, flat_normal)), 0.1, 1.0);
+    let facing = clamp(abs(dot(view, flat_normal)), STEEPEST, 1.0);
     let along = view - flat_normal * dot(view, flat_normal);
     let size = length(along);
     return Tilt(select(vec3f(0.0), along / size, size > 1e-3), facing);
 }
 
+// The distance at which a disk of the radius `a` stands for such an ellipse. Ellipses of neighbours do not overlap, so near
+// one the distance is measured by its axes.
 fn distance_to_piece(offset: vec3f, a: f32, tilt: Tilt) -> f32 {
     let squared = dot(offset, offset);
     let along = dot(offset, tilt.along);
     let across = max(0.0, squared - along * along);
     let by_axes = along * along * tilt.facing + across / tilt.facing;
-    let nearness = a * a / max(a * a + squared, 1e-30 * a);
+    let nearness = a * a / (a * a + squared);
     return sqrt(max(0.0, squared + nearness * (by_axes - squared)));
 }
 
