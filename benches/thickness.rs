@@ -1,22 +1,24 @@
 //! What thickness costs and what it is worth: `cargo bench --bench thickness -- rays` compares the sweeps that bake lengths with
 //! a traversal of a hierarchy of boxes, and `-- pictures` draws a figure lit from three sides by each method, measures it
 //! against the truth with the brightness of all pictures made alike, as [Tomaszewska2012, fig. 4] does with observers, and
-//! writes `docs/thickness.png`.
+//! writes `docs/thickness.png`. Truths are those of `diaphane bench scenes/bench/thickness-*.ron`, which takes the times, and
+//! whoever of the two comes second finds them made.
 
-use diaphane::frame::Part;
+use diaphane::bench::errors;
 use diaphane::geometry::{sculpture, thickness};
 use diaphane::image::{Display, Format, Image, Tone, write_file};
 use diaphane::metric::{Comparison, Pair};
 use diaphane::render::Look;
-use diaphane::scene::{LightKind, Scene, TechniqueText};
-use diaphane::session::{Options, Session};
-use diaphane::store::Watch;
-use glam::{DQuat, Vec3A};
+use diaphane::scene::{Scene, TechniqueText, Truth};
+use diaphane::session::{Goal, Options, Session};
+use diaphane::store::{PlannedStep, Watch};
+use glam::Vec3A;
 use obvhs::BvhBuildParams;
 use obvhs::cwbvh::builder::build_cwbvh_from_tris;
 use obvhs::ray::{Ray, RayHit};
 use obvhs::triangle::Triangle;
 use std::path::Path;
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 fn main() {
@@ -34,6 +36,7 @@ fn main() {
 /// Rays that leave a figure's vertices inwards, on one thread.
 fn rays() {
     const DIRECTIONS: usize = 256;
+    const TURNS: usize = 7;
     let mesh = sculpture::sculpture(sculpture::Figure::Hare, 5.0, 190);
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread can be had");
     let count = mesh.positions.len() * DIRECTIONS / 2;
@@ -66,7 +69,8 @@ fn rays() {
         assert!(met > 0.0, "something is met");
         f64::from(cast) / started.elapsed().as_secs_f64()
     };
-    for turn in 1..=3 {
+    let mut ratios = Vec::new();
+    for turn in 1..=TURNS {
         let (first, every) = (traced(false), traced(true));
         let started = Instant::now();
         one.install(|| thickness::lengths(&mesh, DIRECTIONS, &|_| Ok(()))).expect("nobody interrupts");
@@ -79,112 +83,131 @@ fn rays() {
             swept / 1e6,
             swept / first
         );
+        ratios.push(swept / first);
+    }
+    ratios.sort_by(f64::total_cmp);
+    let (least, median, most) = (ratios[0], ratios[TURNS / 2], ratios[TURNS - 1]);
+    println!("sweeps over first hits of the CwBvh: median {median:.2}, {least:.2} to {most:.2}");
+}
+
+/// A line for each tenth of what takes long.
+#[derive(Default)]
+struct Told(Mutex<(&'static str, u32)>);
+
+impl Watch for Told {
+    fn progress(&self, step: &PlannedStep, share: f64) {
+        let now = (step.name, (10.0 * share) as u32);
+        let mut last = self.0.lock().expect("no panic while telling");
+        if step.is_bake() && *last != now {
+            *last = now;
+            eprintln!("  {}: {} %", step.about, 10 * now.1);
+        }
     }
 }
 
-struct Quiet;
-impl Watch for Quiet {}
-
 const SIDES: [&str; 3] = ["back", "front", "left"];
-const SIZE: (u32, u32) = (64, 64);
+/// As `scenes/bench/thickness-*.bench.ron` have it.
+const SIZE: (u32, u32) = (80, 128);
+const AT_MOST: f64 = 0.02;
+const MAX_SAMPLES: u64 = 1024;
 /// How many pixels of the sheet show one of a picture, along each side.
 const SHOWN: u32 = 2;
-const TRUTH: &str = "Reference(light: Direct, max_error: 0.03, max_spp: 128)";
-const FIGURE: [&str; 5] = [
-    "Opaque()",
-    "FilteredNormals()",
-    "DepthMapThickness()",
-    "SphericalThickness()",
+/// The columns of the sheet, behind the truth.
+const COLUMNS: [&str; 4] = ["SphericalThickness()", "DepthMapThickness()", "FilteredNormals()", "Opaque()"];
+const PAPERS: [&str; 2] = [
     "SphericalThickness(terms: Paper, attenuation: Linear, encode: Thickness)",
+    "DepthMapThickness(terms: Paper, attenuation: Beer, sigma: Extinction)",
 ];
 
 struct Studio {
     session: Session,
+    told: Told,
+}
+
+/// What pictures are measured against.
+struct Truthful {
+    picture: Image,
+    variance: Image,
+    mask: Vec<bool>,
 }
 
 impl Studio {
-    fn scene(&self, side: &str) -> Scene {
-        let path = format!("scenes/bench/thickness-{side}.ron");
-        self.session.scene(Path::new(&path)).unwrap_or_else(|problems| panic!("{problems}")).0
-    }
-
-    fn picture(&mut self, scene: &Scene, technique: &str, skip: bool) -> Image {
+    fn look(scene: &Scene, technique: &str) -> Look {
         let mut look = Look::of(scene);
         look.technique = TechniqueText::from_flag("--technique", technique).expect("it can be read");
         look.view.size = SIZE;
-        look.view.part = Part::Scattered;
-        look.view.skip = skip;
-        let drawn = self.session.render(scene, &look, &Quiet).unwrap_or_else(|problem| panic!("{problem}"));
+        look.view.part = errors::PART;
+        look
+    }
+
+    fn truth(&mut self, scene: &Scene) -> Truthful {
+        let view = Studio::look(scene, "Opaque()").view;
+        let settings = errors::settings(Truth::Volume, scene, &view);
+        let goal = Goal::Error { part: errors::PART, at_most: AT_MOST, min_samples: 64, max_samples: MAX_SAMPLES };
+        let film = self.session.trace(scene, &settings, &goal, &self.told, |film| {
+            eprintln!("  {}", film.level(errors::PART));
+        });
+        let film = film.unwrap_or_else(|problem| panic!("{problem}"));
+        println!("the truth: {}", film.level(errors::PART));
+        Truthful {
+            picture: film.picture(errors::PART),
+            variance: film.variance(errors::PART),
+            mask: film.pixels.iter().map(|pixel| pixel.is_object).collect(),
+        }
+    }
+
+    fn picture(&mut self, scene: &Scene, technique: &str) -> Image {
+        let look = Studio::look(scene, technique);
+        let drawn = self.session.render(scene, &look, &self.told).unwrap_or_else(|problem| panic!("{problem}"));
         drawn.1.as_ref().clone()
     }
+}
 
-    /// The median of five frames, ms, the lamp a little farther round each time.
-    fn frame(&mut self, scene: &Scene, technique: &str, skip: bool) -> f64 {
-        self.picture(scene, technique, skip);
-        let mut times = [1, 2, 3, 4, 5].map(|i| {
-            let mut moved = scene.clone();
-            for light in &mut moved.lights {
-                if let LightKind::Directional { direction, .. } = &mut light.kind {
-                    *direction = DQuat::from_rotation_y(1e-3 * f64::from(i)) * *direction;
-                }
-            }
-            let started = Instant::now();
-            self.picture(&moved, technique, skip);
-            1e3 * started.elapsed().as_secs_f64()
-        });
-        times.sort_by(f64::total_cmp);
-        times[2]
+impl Truthful {
+    fn mean(&self, image: &Image) -> f32 {
+        let seen = || image.pixels.iter().zip(&self.mask).filter(|(_, is_object)| **is_object);
+        seen().flat_map(|(pixel, _)| pixel).sum::<f32>() / (3 * seen().count()) as f32
     }
-}
 
-fn mean(image: &Image) -> f32 {
-    image.pixels.iter().flatten().sum::<f32>() / (3 * image.pixels.len()) as f32
-}
+    /// As bright as the truth in the mean, and what that took.
+    fn alike(&self, image: &Image) -> (Image, f32) {
+        let factor = self.mean(&self.picture) / self.mean(image).max(f32::MIN_POSITIVE);
+        let pixels = image.pixels.iter().map(|pixel| pixel.map(|v| factor * v)).collect();
+        (Image { pixels, ..image.clone() }, factor)
+    }
 
-/// As bright as another in the mean.
-fn alike(image: &Image, other: &Image) -> Image {
-    let factor = mean(other) / mean(image).max(f32::MIN_POSITIVE);
-    let pixels = image.pixels.iter().map(|pixel| pixel.map(|v| factor * v)).collect();
-    Image { pixels, ..image.clone() }
+    fn told(&self, image: &Image) -> String {
+        let pair =
+            Pair::new(image, &self.picture).and_then(|pair| pair.masked(&self.mask)).expect("they are of one size");
+        let found = Comparison::of(&pair, Some(&self.variance)).expect("they can be compared");
+        format!("{:.4} {:.4} {:.4}", found.relmse.errors.all.mean, found.dssim.all.mean, found.flip.spread.mean)
+    }
 }
 
 fn pictures() {
     let options = Options { cache_dir: std::env::var_os("DIAPHANE_CACHE").map(Into::into), ..Options::default() };
-    let mut studio = Studio { session: Session::new(options) };
+    let mut studio = Studio { session: Session::new(options), told: Told::default() };
     let mut rows: Vec<Vec<Image>> = Vec::new();
-    println!(
-        "\nside, method: mean over the truth's; DSSIM, FLIP at the truth's brightness; DSSIM, FLIP as it is; frame, ms"
-    );
+    println!("factor to the truth's brightness; relMSE, DSSIM, FLIP with it; the same three without");
     for side in SIDES {
-        let scene = studio.scene(side);
-        let truth = studio.picture(&scene, TRUTH, true);
-        let mut row = vec![truth.clone()];
-        let measure = |studio: &mut Studio, technique: &str, skip: bool, name: &str| {
-            let picture = studio.picture(&scene, technique, skip);
-            let shown = alike(&picture, &truth);
-            let told = |image: &Image| {
-                let pair = Pair::new(image, &truth).expect("they are of one size");
-                let found = Comparison::of(&pair, None).expect("they can be compared");
-                format!("{:.4} {:.4}", found.dssim.all.mean, found.flip.spread.mean)
-            };
-            println!(
-                "{side:5} {name:75} {:.3}  {}  {}  {:.1}",
-                mean(&picture) / mean(&truth),
-                told(&shown),
-                told(&picture),
-                studio.frame(&scene, technique, skip)
-            );
+        let path = format!("scenes/bench/thickness-{side}.ron");
+        println!("\n{path}");
+        let scene = studio.session.scene(Path::new(&path)).unwrap_or_else(|problems| panic!("{problems}")).0;
+        let truth = studio.truth(&scene);
+        let mut measure = |technique: &str| {
+            let picture = studio.picture(&scene, technique);
+            let (shown, factor) = truth.alike(&picture);
+            println!("{technique:75} {factor:7.3}  {}  {}", truth.told(&shown), truth.told(&picture));
             shown
         };
-        for technique in FIGURE {
-            let shown = measure(&mut studio, technique, true, technique);
-            row.push(shown);
+        let drawn: Vec<Image> = COLUMNS.iter().map(|technique| measure(technique)).collect();
+        for technique in PAPERS {
+            measure(technique);
         }
         for bands in 2..=7 {
-            let technique = format!("SphericalThickness(bands: {bands}, front_bands: {bands})");
-            measure(&mut studio, &technique, true, &format!("{} coefficients", bands * bands));
+            measure(&format!("SphericalThickness(bands: {bands}, front_bands: {bands})"));
         }
-        rows.push(row);
+        rows.push([truth.picture].into_iter().chain(drawn).collect());
     }
     let (width, height) = (rows[0].len() as u32 * SIZE.0 * SHOWN, rows.len() as u32 * SIZE.1 * SHOWN);
     let texel = |i: u32| {
