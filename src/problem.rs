@@ -45,9 +45,10 @@ impl At {
         const WHOLE: usize = 200;
         const BEFORE: usize = 40;
         const SHOWN: usize = 120;
-        let column = line[..span.start].chars().count() + 1;
-        let width = line[span].chars().count().max(1);
         let line = line.trim_end_matches('\r');
+        let (start, end) = (span.start.min(line.len()), span.end.min(line.len()));
+        let column = line[..start].chars().count() + 1;
+        let width = line[start..end].chars().count().max(1);
         let length = line.chars().count();
         let (source, mark, width) = match length <= WHOLE {
             true => (line.to_string(), column, width),

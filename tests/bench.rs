@@ -121,6 +121,10 @@ fn a_slow_pass_and_a_wrong_technique_are_found() {
     }
     // Shapes at rest and what was uploaded of them stay.
     assert!(!names.iter().any(|name| name.contains("geometry.") || name.contains("upload")), "{names:?}");
+    // What an edit does not change has no row: shading knows no kernel.
+    let edits: BTreeSet<_> = names.iter().filter_map(|name| name.strip_prefix("edit:")).collect();
+    assert_eq!(edits, BTreeSet::from(["camera", "light", "medium", "surface"]));
+    assert!(plain.values(&subject, "edit:light").all(|time| time > 0.0));
     assert_eq!(slow.values(&subject, "pass:test.slow").collect::<Vec<_>>(), [600_000.0; 3]);
     assert!(slow.values(&subject, "frame").all(|time| time > 600_000.0));
 }

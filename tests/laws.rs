@@ -344,6 +344,23 @@ fn full_shadow_is_black_and_its_edge_is_where_it_belongs() {
     }
 }
 
+#[test]
+fn nothing_leaks_where_the_faces_of_a_shadow_cube_meet() {
+    let mut studio = ready();
+    // The corners of the cube of maps look at those of a hood that stands on the floor, beyond which there is only night.
+    let hood = r#"(name: "hood", mesh: Box(size: (1.96, 1.96, 1.96)), material: "paint.ron",
+        transform: (translate: (0, 0.99, 0)))"#;
+    let view = Eye { eye: dvec3(2.5, 1.0, 2.5), target: dvec3(1.05, 0.0, 1.05), fov_y_deg: 12.0 };
+    for height in [0.99, 1.1] {
+        let lamp = format!("Point(position: (0, {height}, 0), intensity: 50)");
+        let head = format!("mm_per_unit: 10, {}, lights: [{lamp}]", view.text());
+        let dark = studio.picture(&format!("{head}, objects: [{FLOOR}, {hood}], {VIEW}"));
+        assert!(pixels(&dark).all(|(.., found)| found == DVec3::ZERO), "light of a lamp at {height} leaks");
+        let bright = studio.picture(&format!("{head}, objects: [{FLOOR}], {VIEW}"));
+        assert!(pixels(&bright).all(|(.., found)| found.min_element() > 0.0));
+    }
+}
+
 /// Whether the way from `p` along `d`, up to `length` of it, meets the blocker.
 fn hits_box(p: DVec3, d: DVec3, length: f64) -> bool {
     let (low, high) = (dvec3(-1.0, 1.9, -1.0), dvec3(1.0, 2.1, 1.0));

@@ -33,10 +33,7 @@ fn face(d: vec3f) -> u32 {
 fn sees_sample(point: vec3f, normal: vec3f, entry: f32, light: Light, i: i32) -> f32 {
     let to_light = select(light_sample(light, i) - point, light.position, light.kind == DIRECTIONAL);
     var index = u32(i) * views.per_sample;
-    if views.per_sample == 6u {
-        index += face(-to_light);
-    }
-    let view = shadow_views[index];
+    var view = shadow_views[index];
     let depth = select(length(to_light), 1.0, view.is_directional == 1u);
     let cos_light = dot(normalize(to_light), normal);
     // A texel covers a slope: stepping off it along the normal, by as much as the filter is wide, takes the surface out
@@ -44,6 +41,11 @@ fn sees_sample(point: vec3f, normal: vec3f, entry: f32, light: Light, i: i32) ->
     let texel = view.texel * depth;
     let offset = entry + texel * (0.5 + 2.0 * sqrt(max(0.0, 1.0 - cos_light * cos_light)));
     let lifted = point + offset * normal;
+    // Near the edge of a cube's face the step may lead over it.
+    if views.per_sample == 6u {
+        index += face(lifted - point - to_light);
+        view = shadow_views[index];
+    }
     let clip = view.clip_from_eye * vec4f(lifted, 1.0);
     let ndc = clip.xyz / clip.w;
     // What lies outside the map has nothing between itself and the light.

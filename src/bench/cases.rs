@@ -1,5 +1,6 @@
 //! What is measured: scenes, and the techniques with their settings that contend on each.
 
+use super::edits::{Edit, KINDS};
 use super::samples::Subject;
 use crate::frame::Part;
 use crate::gpu::{Images, Shaders};
@@ -52,6 +53,8 @@ pub struct Contender {
     pub frame: (Plan, Slot<Images>),
     /// A frame a moment later: what it shares with `frame` stays from frame to frame.
     pub next: Plan,
+    /// The same after an edit, for every kind that changes this picture.
+    pub edits: Vec<Edit>,
     /// What is held against the truths.
     pub picture: (Plan, Slot<Image>),
 }
@@ -120,6 +123,16 @@ impl Case {
             render::plan_shown(scene, look, display, shaders, drawn).map(|shown| (shown.plan, shown.picture))
         };
         let (moved, moment) = super::timing::later(&self.scene, &look);
+        let frame = shown(&self.scene, &look)?;
+        let mut edits = Vec::new();
+        for (kind, change) in KINDS {
+            let (mut scene, mut look) = (self.scene.clone(), look.clone());
+            change(&mut scene, &mut look);
+            let edited = shown(&scene, &look)?;
+            if edited.1.key() != frame.1.key() {
+                edits.push(Edit { kind, frame: edited });
+            }
+        }
         let (width, height) = look.view.size;
         let settings = text.ron.strip_prefix(&text.name).unwrap_or_default();
         let settings = settings.strip_prefix('(').and_then(|rest| rest.strip_suffix(')')).unwrap_or_default();
@@ -130,7 +143,8 @@ impl Case {
                 settings: settings.to_string(),
                 size: format!("{width}x{height}"),
             },
-            frame: shown(&self.scene, &look)?,
+            frame,
+            edits,
             next: shown(&moved, &moment)?.0,
             picture: render::plan(&self.scene, &judged, shaders)?,
         }))

@@ -40,7 +40,7 @@ const UNSEEN: f64 = 1e-3;
 const ROUNDING: f64 = 1e-4;
 
 fn is_time(measure: &str) -> bool {
-    measure == "frame" || measure == "bake" || measure.starts_with("pass:")
+    measure == "frame" || measure == "bake" || measure.starts_with("pass:") || measure.starts_with("edit:")
 }
 
 /// What both hold and the second has worse. Times only where they can be held against each other.

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`cases`] | what is measured: scenes, and the techniques with their settings that contend on each |
 //! | [`timing`] | bakes, made once; frames, drawn again and again |
+//! | [`edits`] | what an artist may change, and how long it takes until it shows |
 //! | [`errors`] | the truths, and how far from them a picture is |
 //! | [`samples`] | every value, one a row: `samples.csv` |
 //! | [`machine`] | on what it was measured: `machine.json` |
@@ -18,6 +19,7 @@
 
 pub mod cases;
 pub mod checks;
+pub mod edits;
 pub mod errors;
 pub mod machine;
 pub mod page;
@@ -48,8 +50,12 @@ use timing::{Bakes, Warm, draw};
 /// Draws the order of frames. Any number serves; always the same one makes runs comparable.
 pub const ORDER_SEED: u64 = 1;
 
+/// How often an edit is made at most: some bake for seconds.
+const EDIT_REPETITIONS: u32 = 3;
+
 /// The code that decides what is measured and how. A row that other code made is no longer true.
-const CODE: [&str; 12] = [
+const CODE: [&str; 13] = [
+    "src/bench/edits.rs",
     "src/bench/timing.rs",
     "src/bench/errors.rs",
     "src/metric/",
@@ -205,12 +211,26 @@ fn frames(
     let mut lots = Vec::new();
     for (place, (contender, made)) in ready.iter().enumerate() {
         let subject = &contender.subject;
-        let frame = Warm::up(gpu, contender, made, &cancel, watch)?;
+        let mut frame = Warm::up(gpu, contender, made, &cancel, watch)?;
         if let Some(bytes) = frame.peak_memory
             && record.samples.value(subject, "peak_memory").is_none()
         {
             record.add([sample(subject, "peak_memory", "bytes", 1, bytes as f64)])?;
         }
+        for edit in &contender.edits {
+            let measure = format!("edit:{}", edit.kind);
+            let there = record.samples.values(subject, &measure).count() as u32;
+            let wanted = case.repetitions.min(EDIT_REPETITIONS);
+            if there < wanted {
+                tell(&format!("{}: another {}, {}", case.name, edit.kind, subject.words()));
+                frame.edit(gpu, edit, &cancel, watch)?; // compiles what is new
+            }
+            for repeat in there + 1..=wanted {
+                let time = frame.edit(gpu, edit, &cancel, watch)?;
+                record.add([sample(subject, &measure, "ms", repeat, time)])?;
+            }
+        }
+        frame.settle();
         warm.push(frame);
         let there = record.samples.values(subject, "frame").count() as u32;
         lots.extend((there + 1..=case.repetitions).map(|_| place));

@@ -131,11 +131,19 @@ fn table(out: &mut String, chapter: &Chapter) {
         writeln!(out, "<tr><td><code>{}</code></td>{cells}</tr>", escaped(&line.words)).expect(ANY);
     }
     out.push_str("</table>\n");
-    for line in chapter.lines.iter().filter(|line| !line.passes.is_empty()) {
-        let passes: Vec<String> =
-            line.passes.iter().take(8).map(|(name, time)| format!("{name} {} ms", number(*time))).collect();
-        let words = escaped(&format!(": {}", passes.join(", ")));
-        writeln!(out, "<p><small><code>{}</code>{words}</small></p>", escaped(&line.words)).expect(ANY);
+    let listed = |times: &[(String, f64)]| {
+        let each: Vec<String> =
+            times.iter().take(8).map(|(name, time)| format!("{name} {} ms", number(*time))).collect();
+        each.join(", ")
+    };
+    for line in chapter.lines {
+        let [passes, edits] = [&line.passes, &line.edits].map(|times| listed(times));
+        for (what, times) in [("passes", passes), ("until an edit shows", edits)] {
+            if !times.is_empty() {
+                let (technique, words) = (escaped(&line.words), escaped(&format!(", {what}: {times}")));
+                writeln!(out, "<p><small><code>{technique}</code>{words}</small></p>").expect(ANY);
+            }
+        }
     }
 }
 

@@ -74,6 +74,8 @@ pub struct Line {
     pub errors: Vec<(Truth, Error)>,
     /// The median of each pass, ms; the longest first.
     pub passes: Vec<(String, f64)>,
+    /// Likewise of each kind of edit.
+    pub edits: Vec<(String, f64)>,
 }
 
 fn by_truth<S: serde::Serializer>(errors: &[(Truth, Error)], serializer: S) -> Result<S::Ok, S::Error> {
@@ -83,12 +85,15 @@ fn by_truth<S: serde::Serializer>(errors: &[(Truth, Error)], serializer: S) -> R
 impl Line {
     pub fn of(samples: &Samples, subject: &Subject, truths: &[Truth]) -> Line {
         let error = |&truth: &Truth| Some((truth, Error::of(samples, subject, truth)?));
-        let pass = |measure: &str| {
-            let name = measure.strip_prefix("pass:")?;
-            Some((name.to_string(), Quartiles::of(samples.values(subject, measure))?.median))
+        let medians = |prefix: &str| {
+            let median = |measure: &str| {
+                let name = measure.strip_prefix(prefix)?;
+                Some((name.to_string(), Quartiles::of(samples.values(subject, measure))?.median))
+            };
+            let mut found: Vec<_> = samples.measures(subject).into_iter().filter_map(median).collect();
+            found.sort_by(|a, b| b.1.total_cmp(&a.1));
+            found
         };
-        let mut passes: Vec<_> = samples.measures(subject).into_iter().filter_map(pass).collect();
-        passes.sort_by(|a, b| b.1.total_cmp(&a.1));
         Line {
             technique: subject.technique.clone(),
             settings: subject.settings.clone(),
@@ -97,7 +102,8 @@ impl Line {
             bake: samples.value(subject, "bake"),
             peak_memory: samples.value(subject, "peak_memory"),
             errors: truths.iter().filter_map(error).collect(),
-            passes,
+            passes: medians("pass:"),
+            edits: medians("edit:"),
         }
     }
 

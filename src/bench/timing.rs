@@ -5,10 +5,11 @@
 //! rest, and what was uploaded of them.
 
 use super::Contender;
+use super::edits::Edit;
 use crate::gpu::{Gpu, Images};
 use crate::problem::Problem;
 use crate::render::Look;
-use crate::scene::{LightKind, Scene};
+use crate::scene::{Camera, LightKind, Scene};
 use crate::session::Session;
 use crate::store::{Cancel, Finished, Key, Origin, Plan, PlannedStep, Slot, Store, Values, Watch};
 use glam::{DQuat, DVec3};
@@ -19,9 +20,9 @@ use std::time::Duration;
 /// The scene and the look a moment later.
 pub fn later(scene: &Scene, look: &Look) -> (Scene, Look) {
     let (mut scene, mut look) = (scene.clone(), look.clone());
-    let camera = &mut look.view.camera;
-    let step = 1e-3 * (camera.target - camera.eye).length() * DVec3::new(0.48, 0.6, 0.64);
-    (camera.eye, camera.target) = (camera.eye + step, camera.target + step);
+    let camera = aside(&look.view.camera);
+    let step = camera.eye - look.view.camera.eye;
+    look.view.camera = camera;
     look.view.time_s += 1.0 / 24.0;
     for light in &mut scene.lights {
         match &mut light.kind {
@@ -32,6 +33,12 @@ pub fn later(scene: &Scene, look: &Look) -> (Scene, Look) {
         }
     }
     (scene, look)
+}
+
+/// The camera a small step away.
+pub fn aside(camera: &Camera) -> Camera {
+    let step = 1e-3 * (camera.target - camera.eye).length() * DVec3::new(0.48, 0.6, 0.64);
+    Camera { eye: camera.eye + step, target: camera.target + step, ..*camera }
 }
 
 /// Notes what ran, and how much was allocated meanwhile.
@@ -140,6 +147,8 @@ pub fn draw<T: Send + Sync + 'static>(
 pub struct Warm {
     /// What stays from frame to frame.
     stays: Values,
+    /// All of the frame that is there when something is edited.
+    held: Values,
     /// The most that a first frame took on the device, bytes, with what stays.
     pub peak_memory: Option<u64>,
 }
@@ -162,9 +171,23 @@ impl Warm {
         let (_, most) = meter.into_noted();
         let kept = bakes(plan);
         let next: BTreeSet<Key> = contender.next.keys().collect();
-        let mut stays = store.held(plan);
+        let held = store.held(plan);
+        let mut stays = held.clone();
         stays.retain(|key| kept.contains(key) || next.contains(key));
-        Ok(Warm { stays, peak_memory: before.map(|before| most.saturating_sub(before)) })
+        Ok(Warm { stays, held, peak_memory: before.map(|before| most.saturating_sub(before)) })
+    }
+
+    /// How long it takes until an edit shows, ms: the sum of the steps that run for it.
+    pub fn edit(&self, gpu: &Gpu, edit: &Edit, cancel: &Cancel, watch: &dyn Watch) -> Result<f64, Problem> {
+        let (plan, slot) = &edit.frame;
+        let meter = Meter::new(watch, None);
+        store_with(plan, self.held.clone(), cancel).get_with(plan, *slot, Some(gpu), &meter)?;
+        Ok(meter.into_noted().0.iter().map(|step| 1e3 * step.time.as_secs_f64()).sum())
+    }
+
+    /// Lets go of what only edits need.
+    pub fn settle(&mut self) {
+        self.held = Values::default();
     }
 
     /// The passes of another frame with the time of each, ms, by name; together they are the frame.
