@@ -14,7 +14,7 @@
 use super::intrinsic::Intrinsic;
 use super::mesh::{Mesh, weld};
 use glam::DVec3;
-use sprs::{CsMat, TriMat};
+use sprs::CsMat;
 
 /// No sample.
 pub const NOWHERE: u32 = u32::MAX;
@@ -145,25 +145,58 @@ fn components(corners: &[[u32; 3]], count: usize) -> Vec<u32> {
 }
 
 fn assemble(triangles: &Intrinsic, count: usize) -> (CsMat<f64>, Vec<f64>) {
-    let mut areas = vec![0.0; count];
-    let mut entries = TriMat::with_capacity((count, count), count + 12 * triangles.corners.len());
-    // A diagonal, even of samples whose edges all return to them.
-    (0..count).for_each(|i| entries.add_triplet(i, i, 0.0));
+    let (mut areas, mut diagonal) = (vec![0.0; count], vec![0.0; count]);
+    let mut sides: Vec<(u32, u32, f64)> = Vec::with_capacity(6 * triangles.corners.len());
     for (t, corners) in triangles.corners.iter().enumerate() {
         for i in 0..3 {
             areas[corners[i] as usize] += triangles.area(t) / 3.0;
-            let (a, b) = (corners[i] as usize, corners[(i + 1) % 3] as usize);
+            let (a, b) = (corners[i], corners[(i + 1) % 3]);
             let weight = 0.5 * triangles.cotangent(3 * t + i);
             // An edge that returns to where it began costs nothing.
             if a != b {
-                entries.add_triplet(a, a, weight);
-                entries.add_triplet(b, b, weight);
-                entries.add_triplet(a, b, -weight);
-                entries.add_triplet(b, a, -weight);
+                diagonal[a as usize] += weight;
+                diagonal[b as usize] += weight;
+                sides.extend([(a, b, -weight), (b, a, -weight)]);
             }
         }
     }
-    (entries.to_csc(), areas)
+    (symmetric(&diagonal, &sides), areas)
+}
+
+/// A matrix of a diagonal, all of which is there, and the sums of entries off it, of which each is given with its mirror
+/// image. Sorted by rows in one sweep, then within each: a fifth of the time of sorting them all.
+fn symmetric(diagonal: &[f64], entries: &[(u32, u32, f64)]) -> CsMat<f64> {
+    let mut ends = vec![0; diagonal.len() + 1];
+    entries.iter().for_each(|entry| ends[entry.0 as usize + 1] += 1);
+    (0..diagonal.len()).for_each(|row| ends[row + 1] += ends[row]);
+    let mut rows = vec![(0, 0.0); entries.len()];
+    let mut next = ends.clone();
+    for &(row, column, value) in entries {
+        rows[next[row as usize]] = (column as usize, value);
+        next[row as usize] += 1;
+    }
+    let (mut starts, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
+    for (row, own) in diagonal.iter().enumerate() {
+        let row_entries = &mut rows[ends[row]..ends[row + 1]];
+        // Stable, so that mirror images are summed in one order.
+        row_entries.sort_by_key(|(column, _)| *column);
+        let mut has_own = false;
+        for same in row_entries.chunk_by(|one, other| one.0 == other.0) {
+            if !has_own && same[0].0 > row {
+                columns.push(row);
+                values.push(*own);
+                has_own = true;
+            }
+            columns.push(same[0].0);
+            values.push(same.iter().map(|(_, value)| value).sum());
+        }
+        if !has_own {
+            columns.push(row);
+            values.push(*own);
+        }
+        starts.push(columns.len());
+    }
+    CsMat::new_csc((diagonal.len(), diagonal.len()), starts, columns, values)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@
 //! at its two ends (Sylvester's law of inertia): nothing else notices a pair that was skipped or found twice. Every pair's
 //! residual is measured. A band never ends within a repeated eigenvalue.
 
-use faer::Mat;
+use faer::{Mat, MatMut};
 use glam::DVec3;
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::Rng;
@@ -132,7 +132,7 @@ struct Slicer<'a> {
 fn is_sound(factor: &Factor, matrix: &CsMat<f64>) -> bool {
     let right: Vec<f64> = (0..matrix.rows()).map(|i| (1.7 * i as f64 + 0.4).sin()).collect();
     let mut solved = right.clone();
-    factor.solve(&mut solved);
+    factor.solve(MatMut::from_column_major_slice_mut(&mut solved, right.len(), 1));
     let (mut residual, mut scale) = (0.0f64, 0.0f64);
     for (row, right) in matrix.outer_iterator().zip(&right) {
         let terms = row.iter().map(|(j, w)| w * solved[j]);
@@ -196,8 +196,8 @@ impl Slicer<'_> {
             // What the inverse makes of the last block, and what of that is new.
             let range = last..space.size;
             block = Mat::from_fn(n, range.len(), |i, c| space.column(range.start + c)[i] * space.root[i]);
+            factor.solve(block.as_mut());
             for c in 0..range.len() {
-                factor.solve(block.col_as_slice_mut(c));
                 block.col_as_slice_mut(c).iter_mut().zip(&space.root).for_each(|(v, root)| *v *= root);
             }
             let splits = space.extend(block, None);

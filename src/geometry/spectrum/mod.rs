@@ -88,6 +88,9 @@ pub struct Basis {
     pub error: f64,
 }
 
+/// Samples that are summed together: their sums stay in a core's first cache.
+const CHUNK: usize = 1024;
+
 /// The weights of a kernel for the parts of a basis.
 pub struct Weights {
     pub low: f64,
@@ -142,20 +145,33 @@ impl Basis {
     pub fn filter(&self, kernel: &Kernel, mm_per_unit: f64) -> Vec<Vec3> {
         let weights = self.weights(kernel, mm_per_unit);
         let modes: Vec<Vec3> = weights.modes.iter().zip(&self.coefficients).map(|(w, c)| (*w * *c).as_vec3()).collect();
-        const CHUNK: usize = 1024;
-        let chunk = |first: usize| {
-            let mut sums = vec![Vec3::ZERO; CHUNK.min(self.samples - first)];
-            for (k, coefficient) in modes.iter().enumerate() {
-                let column = &self.columns[k * self.samples + first..];
-                sums.iter_mut().zip(column).for_each(|(sum, y)| *sum += *y * *coefficient);
-            }
-            sums
-        };
-        let sums: Vec<Vec<Vec3>> =
-            (0..self.samples.div_ceil(CHUNK)).into_par_iter().map(|c| chunk(c * CHUNK)).collect();
-        let sum = |s: u32| if s == NOWHERE { Vec3::ZERO } else { sums[s as usize / CHUNK][s as usize % CHUNK] };
+        let mut sums = vec![Vec3::ZERO; self.samples];
+        sums.par_chunks_mut(CHUNK).enumerate().for_each(|(c, sums)| self.sum_chunk(c * CHUNK, &modes, sums));
+        let sum = |s: u32| if s == NOWHERE { Vec3::ZERO } else { sums[s as usize] };
         let (low, high) = (weights.low as f32, weights.high as f32);
         (0..self.sample.len()).map(|v| low * self.low[v] + sum(self.sample[v]) + high * self.high[v]).collect()
+    }
+
+    /// The sum over the modes, each with its weight, at the samples from `first` on. Four modes at a time and an axis at a
+    /// time: vectors of a processor are filled, and sums are written a quarter as often.
+    fn sum_chunk(&self, first: usize, modes: &[Vec3], sums: &mut [Vec3]) {
+        let mut axes = [[0.0f32; CHUNK]; 3];
+        let column = |k: usize| &self.columns[k * self.samples + first..][..sums.len()];
+        let mut k = 0;
+        for four in modes.chunks(4) {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|i| column(k + i.min(four.len() - 1)));
+            for (axis, axis_sums) in axes.iter_mut().enumerate() {
+                let [wa, wb, wc, wd] = [0, 1, 2, 3].map(|i| four.get(i).map_or(0.0, |weight| weight[axis]));
+                let values = a.iter().zip(b).zip(c.iter().zip(d));
+                for (sum, ((a, b), (c, d))) in axis_sums.iter_mut().zip(values) {
+                    *sum += (wa * a + wb * b) + (wc * c + wd * d);
+                }
+            }
+            k += 4;
+        }
+        for (i, sum) in sums.iter_mut().enumerate() {
+            *sum = Vec3::new(axes[0][i], axes[1][i], axes[2][i]);
+        }
     }
 }
 
@@ -266,7 +282,7 @@ pub fn krylov_normals(mesh: &Mesh, band: Band, tick: Tick) -> Result<Basis, Prob
         Band::PerUnit(low, high) => (low * laplacian.edge, high * laplacian.edge),
         Band::PerEdge(low, high) => (low, high),
     };
-    let (modes, error) = krylov::modes(&laplacian, &field, band, tick)?;
+    let (modes, error) = krylov::modes(&laplacian, &field, band, krylov::TOLERANCE, tick)?;
     Ok(Basis::new(&laplacian, &mesh.normals, &field, &modes, FINEST, error))
 }
 

@@ -73,7 +73,7 @@ fn filtered(mesh: &Mesh, kernel: &Kernel, knee: f64) -> (Laplacian, Vec<DVec3>) 
     let laplacian = Laplacian::of(mesh);
     let field = normals(mesh, &laplacian);
     let edge = laplacian.edge;
-    let (modes, _) = krylov::modes(&laplacian, &field, (knee * edge, knee * edge), &still).unwrap();
+    let (modes, _) = krylov::modes(&laplacian, &field, (knee * edge, knee * edge), 1e-5, &still).unwrap();
     let per_edge = Modes { lambda: modes.lambda.iter().map(|l| l / (edge * edge)).collect(), ..modes };
     let found = through(&laplacian, &field, &per_edge, kernel);
     (laplacian, found)
@@ -89,13 +89,13 @@ fn krylov_agrees_with_all_eigenpairs_for_every_smooth_kernel() {
         for step in [0.03, 0.125, 0.5, 2.0] {
             for ratio in [4.0, 16.0] {
                 let band = (step * OMEGA_M, ratio * step * OMEGA_M);
-                let (modes, error) = krylov::modes(&laplacian, &field, band, &still).unwrap();
-                assert!(modes.lambda.len() <= 81 && error < 1e-4, "{name} {step}: {error}");
+                let (modes, error) = krylov::modes(&laplacian, &field, band, krylov::TOLERANCE, &still).unwrap();
+                assert!(modes.lambda.len() <= 81 && error < krylov::TOLERANCE, "{name} {step}: {error}");
                 for knee in [band.0, (band.0 * band.1).sqrt(), band.1] {
                     for kernel in smooth_kernels(knee) {
                         let [a, b] = [&modes, &exact].map(|modes| through(&laplacian, &field, modes, &kernel));
                         let apart = worst(&a, &b);
-                        assert!(apart < 2e-4, "{name}, band {step} x {ratio}, {kernel:?}: {apart}");
+                        assert!(apart < 1e-3, "{name}, band {step} x {ratio}, {kernel:?}: {apart}");
                         // The estimate is a root mean square: a vertex may be farther off, but not by much more.
                         assert!(apart < 1e-4 + 60.0 * error, "{name}, {kernel:?}: {apart}, estimated {error}");
                     }
