@@ -8,7 +8,7 @@
 //! dense algebra on smaller meshes.
 
 use diaphane::bench::Machine;
-use diaphane::geometry::laplacian::Laplacian;
+use diaphane::geometry::laplacian::{Areas, Laplacian};
 use diaphane::geometry::mesh::Mesh;
 use diaphane::geometry::shapes;
 use diaphane::geometry::spectrum::kernel::Kernel;
@@ -64,7 +64,7 @@ struct Exact<'a> {
 
 impl Exact<'_> {
     fn of(mesh: &Mesh) -> Exact<'_> {
-        Exact { mesh, laplacian: Laplacian::of(mesh) }
+        Exact { mesh, laplacian: Laplacian::of(mesh, Areas::VertexArea) }
     }
 
     /// By how much a basis is off, at most.
@@ -100,8 +100,9 @@ fn main() {
         for share in [0.25, 1.0, 2.0] {
             let knee = share * omega_m;
             let band = Band::PerUnit(0.7 * knee, 2.8 * knee);
-            let (basis, bake) =
-                one.install(|| timed(|| krylov_normals(&mesh, band, &still).expect("it has a Laplacian")));
+            let (basis, bake) = one.install(|| {
+                timed(|| krylov_normals(&mesh, Areas::VertexArea, band, &still).expect("it has a Laplacian"))
+            });
             for kernel in [
                 Kernel::Gaussian { width: 1.0 / knee },
                 Kernel::Exponential { width: 1.0 / knee },
@@ -121,8 +122,9 @@ fn main() {
         }
         if thousands <= PAIRS {
             let kernel = Kernel::Gaussian { width: 4.0 / omega_m };
-            let (pairs, bake) =
-                one.install(|| timed(|| harmonic_normals(&mesh, f64::MAX, &still).expect("it has pairs")));
+            let (pairs, bake) = one.install(|| {
+                timed(|| harmonic_normals(&mesh, Areas::VertexArea, f64::MAX, &still).expect("it has pairs"))
+            });
             let (first, edit) = one.install(|| edits(&pairs, &kernel));
             writeln!(
                 table,

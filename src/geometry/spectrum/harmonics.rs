@@ -271,6 +271,7 @@ pub(super) fn all(laplacian: &Laplacian, field: &[DVec3]) -> Result<Modes, Probl
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::laplacian::Areas;
     use crate::geometry::shapes;
 
     fn worst_apart(a: &[DVec3], b: &[DVec3]) -> f64 {
@@ -282,7 +283,7 @@ mod tests {
     fn bands_find_what_dense_algebra_finds_and_no_pair_twice() {
         let cube = shapes::slab(DVec3::splat(1.0), (10, 10));
         for (name, mesh) in [("sphere", shapes::sphere(1.0, 3)), ("cube", cube)] {
-            let laplacian = Laplacian::of(&mesh);
+            let laplacian = Laplacian::of(&mesh, Areas::VertexArea);
             let field: Vec<DVec3> =
                 (0..laplacian.samples()).map(|i| DVec3::new(1.0, 0.3, -0.2) * (1.7 * i as f64).sin()).collect();
             // Three bands or so.
@@ -317,7 +318,7 @@ mod tests {
     #[test]
     fn a_sphere_has_its_frequencies_as_often_as_it_should() {
         let mesh = shapes::sphere(1.0, 3);
-        let laplacian = Laplacian::of(&mesh);
+        let laplacian = Laplacian::of(&mesh, Areas::VertexArea);
         let field = vec![DVec3::ONE; laplacian.samples()];
         // l (l + 1) with 2 l + 1 modes each; between those of 3 and of 4.
         let cut = (16.0f64).sqrt() * laplacian.edge;
