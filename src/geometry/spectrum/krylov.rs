@@ -6,8 +6,8 @@
 //! take the place of the Laplacian's. Slivers, whose eigenvalues are huge, cost nothing: a solve damps them to nothing.
 //!
 //! Steps are added until three kernels (Gaussian, exponential, that of a medium) with knees at both ends of the band change
-//! by no more than [`TOLERANCE`] from one round of the poles to the next. Columns that bring nothing new, as on a sphere, whose normals
-//! are nearly modes themselves, are left out.
+//! by no more than [`TOLERANCE`] from one round of the poles to the next. Columns that bring nothing new, as on a sphere,
+//! whose normals are nearly modes themselves, are left out.
 
 use faer::{Mat, MatRef, Side};
 use glam::DVec3;

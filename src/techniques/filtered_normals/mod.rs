@@ -23,9 +23,9 @@
 //!   kernel has ended; what lies above is weighted as a whole [Patro2007, eq. 11]. The bake is a hundred times longer.
 //! - `Auto` takes eigenpairs for a Box, a Normalized, and a curve as steep as a box, and Krylov for all else.
 //!
-//! The setting `laplacian: MeanArea` divides by one mean area, as [Patro2007, eq. 4] is printed, for comparison: on an even mesh
-//! that is the same, and on an uneven one waves count as longer where triangles are small. The default, `VertexArea`, divides
-//! by the area around each vertex, and `signal: Irradiance` knows no other.
+//! The setting `laplacian: MeanArea` divides by one mean area, as [Patro2007, eq. 4] is printed, for comparison: on an even
+//! mesh that is the same, and on an uneven one waves count as longer where triangles are small. The default, `VertexArea`,
+//! divides by the area around each vertex, and `signal: Irradiance` knows no other.
 //!
 //! The setting `signal: Irradiance` filters light instead: what falls on the vertices, shadows and all, spreads over the edges
 //! of shadows, which filtered normals leave as they are, and none of it is lost. It needs eigenpairs to where the kernel has
