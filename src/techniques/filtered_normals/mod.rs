@@ -36,8 +36,9 @@
 //! 81 modes by Krylov; 64 MiB in all, and where that is less than there should be, modes end earlier) and 32 per vertex. A
 //! kernel that differs between channels has three normals: each light and the surroundings are then gathered three times.
 //! Of a medium of strong colour they point apart, and so each colour of a bump has its own terminator: red light, which
-//! spreads farthest, reaches around it, as it does through skin. Where a medium is so strongly coloured that this looks like
-//! three lamps, give the kernel one width for all channels: `Exponential(width: 1.5)`.
+//! spreads farthest, reaches around it, as it does through skin. Where it spreads as far as a thing is thick, its normals are
+//! also the shortest, and lit sides turn green or blue, which light that is not lost would not do: give such a thing one width
+//! for all channels, `Exponential(width: 1.5)`.
 //!
 //! Fails where light crosses the inside: thin parts stay dark against the light, as `scenes/first-light.ron` shows in the
 //! ears; and a shadow's edge stays sharp where normals are filtered and not the light. Shadows are looked up a
