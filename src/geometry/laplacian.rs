@@ -14,10 +14,22 @@
 use super::intrinsic::Intrinsic;
 use super::mesh::{Mesh, weld};
 use glam::DVec3;
-use sprs::{CsMat, TriMat};
+use serde::{Deserialize, Serialize};
+use sprs::CsMat;
 
 /// No sample.
 pub const NOWHERE: u32 = u32::MAX;
+
+/// By what the stiffness is divided.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Areas {
+    /// By the area around each vertex.
+    #[default]
+    VertexArea,
+    /// By the mean of all, as [Patro2007, eq. 4] is printed: where triangles are small, frequencies count as lower than they
+    /// are.
+    MeanArea,
+}
 
 /// The operator, and the samples that it works on.
 pub struct Laplacian {
@@ -36,7 +48,7 @@ pub struct Laplacian {
 }
 
 impl Laplacian {
-    pub fn of(mesh: &Mesh) -> Laplacian {
+    pub fn of(mesh: &Mesh, by: Areas) -> Laplacian {
         let weld = weld(&mesh.positions);
         let faces: Vec<[u32; 3]> = mesh
             .triangles
@@ -63,7 +75,11 @@ impl Laplacian {
         let corners: Vec<[u32; 3]> = faces.iter().map(|face| face.map(|v| place[v as usize])).collect();
         let component = components(&corners, count as usize);
         let triangles = Intrinsic::new(corners, lengths, &component);
-        let (stiffness, areas) = assemble(&triangles, count as usize);
+        let (stiffness, mut areas) = assemble(&triangles, count as usize);
+        if by == Areas::MeanArea {
+            let mean = areas.iter().sum::<f64>() / areas.len() as f64;
+            areas.fill(mean);
+        }
         Laplacian { stiffness, areas, component, share: shares(mesh, &sample, count as usize), sample, edge }
     }
 
@@ -145,25 +161,58 @@ fn components(corners: &[[u32; 3]], count: usize) -> Vec<u32> {
 }
 
 fn assemble(triangles: &Intrinsic, count: usize) -> (CsMat<f64>, Vec<f64>) {
-    let mut areas = vec![0.0; count];
-    let mut entries = TriMat::with_capacity((count, count), count + 12 * triangles.corners.len());
-    // A diagonal, even of samples whose edges all return to them.
-    (0..count).for_each(|i| entries.add_triplet(i, i, 0.0));
+    let (mut areas, mut diagonal) = (vec![0.0; count], vec![0.0; count]);
+    let mut sides: Vec<(u32, u32, f64)> = Vec::with_capacity(6 * triangles.corners.len());
     for (t, corners) in triangles.corners.iter().enumerate() {
         for i in 0..3 {
             areas[corners[i] as usize] += triangles.area(t) / 3.0;
-            let (a, b) = (corners[i] as usize, corners[(i + 1) % 3] as usize);
+            let (a, b) = (corners[i], corners[(i + 1) % 3]);
             let weight = 0.5 * triangles.cotangent(3 * t + i);
             // An edge that returns to where it began costs nothing.
             if a != b {
-                entries.add_triplet(a, a, weight);
-                entries.add_triplet(b, b, weight);
-                entries.add_triplet(a, b, -weight);
-                entries.add_triplet(b, a, -weight);
+                diagonal[a as usize] += weight;
+                diagonal[b as usize] += weight;
+                sides.extend([(a, b, -weight), (b, a, -weight)]);
             }
         }
     }
-    (entries.to_csc(), areas)
+    (symmetric(&diagonal, &sides), areas)
+}
+
+/// A matrix of a diagonal, all of which is there, and the sums of entries off it, of which each is given with its mirror
+/// image. Sorted by rows in one sweep, then within each: a fifth of the time of sorting them all.
+fn symmetric(diagonal: &[f64], entries: &[(u32, u32, f64)]) -> CsMat<f64> {
+    let mut ends = vec![0; diagonal.len() + 1];
+    entries.iter().for_each(|entry| ends[entry.0 as usize + 1] += 1);
+    (0..diagonal.len()).for_each(|row| ends[row + 1] += ends[row]);
+    let mut rows = vec![(0, 0.0); entries.len()];
+    let mut next = ends.clone();
+    for &(row, column, value) in entries {
+        rows[next[row as usize]] = (column as usize, value);
+        next[row as usize] += 1;
+    }
+    let (mut starts, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
+    for (row, own) in diagonal.iter().enumerate() {
+        let row_entries = &mut rows[ends[row]..ends[row + 1]];
+        // Stable, so that mirror images are summed in one order.
+        row_entries.sort_by_key(|(column, _)| *column);
+        let mut has_own = false;
+        for same in row_entries.chunk_by(|one, other| one.0 == other.0) {
+            if !has_own && same[0].0 > row {
+                columns.push(row);
+                values.push(*own);
+                has_own = true;
+            }
+            columns.push(same[0].0);
+            values.push(same.iter().map(|(_, value)| value).sum());
+        }
+        if !has_own {
+            columns.push(row);
+            values.push(*own);
+        }
+        starts.push(columns.len());
+    }
+    CsMat::new_csc((diagonal.len(), diagonal.len()), starts, columns, values)
 }
 
 #[cfg(test)]
@@ -180,7 +229,7 @@ mod tests {
     #[test]
     fn constants_cost_nothing_and_a_linear_function_its_gradient_squared() {
         let mesh = shapes::slab(DVec3::new(3.0, 2.0, 1.0), (7, 5));
-        let laplacian = Laplacian::of(&mesh);
+        let laplacian = Laplacian::of(&mesh, Areas::VertexArea);
         assert!(energy(&laplacian, &vec![3.0; laplacian.samples()]).abs() < 1e-9);
         // x over the box: 1 on all faces but the two that look along x.
         let mut x = vec![0.0; laplacian.samples()];
@@ -196,7 +245,7 @@ mod tests {
         // -div grad x = 2/R² x; the integral of x² over the sphere is 4 pi R^4 / 3. The error falls with the edges squared.
         let error = |level| {
             let mesh = shapes::sphere(2.0, level);
-            let laplacian = Laplacian::of(&mesh);
+            let laplacian = Laplacian::of(&mesh, Areas::VertexArea);
             let x: Vec<f64> = mesh.positions.iter().map(|p| p.x as f64).collect();
             (energy(&laplacian, &x) / (2.0 * 4.0 * std::f64::consts::PI * 4.0 / 3.0) - 1.0).abs()
         };
@@ -206,13 +255,13 @@ mod tests {
     #[test]
     fn splitting_and_stray_vertices_and_scale_change_nothing() {
         let mesh = shapes::torus(1.0, 0.4, (24, 12));
-        let base = Laplacian::of(&mesh);
+        let base = Laplacian::of(&mesh, Areas::VertexArea);
         let mut split = mesh.clone().with_normals(Normals::Flat);
         split.positions.push(Vec3::splat(1e9));
         split.normals.push(Vec3::Y);
         split.uvs.clear();
         split.triangles.extend([[0, 0, 1], [2, 2, 2]]);
-        let other = Laplacian::of(&split);
+        let other = Laplacian::of(&split, Areas::VertexArea);
         assert_eq!(other.samples(), base.samples());
         assert_eq!(*other.sample.last().unwrap(), NOWHERE);
         let sorted = |l: &Laplacian| {
@@ -224,7 +273,7 @@ mod tests {
         assert!(close(&sorted(&base), &sorted(&other)));
         // No coordinate is so small that it would lose bits.
         for k in [2f64.powi(-60), 2f64.powi(60)] {
-            let scaled = Laplacian::of(&mesh.transformed(&DAffine3::from_scale(DVec3::splat(k))));
+            let scaled = Laplacian::of(&mesh.transformed(&DAffine3::from_scale(DVec3::splat(k))), Areas::VertexArea);
             assert_eq!(scaled.stiffness, base.stiffness);
             assert_eq!(scaled.areas, base.areas);
         }
@@ -240,7 +289,7 @@ mod tests {
             }
             let n = mesh.positions.len() as u32;
             mesh.triangles.extend([[0, 1, n - 1], [0, 1, 0]]);
-            let laplacian = Laplacian::of(&mesh);
+            let laplacian = Laplacian::of(&mesh, Areas::VertexArea);
             assert!(laplacian.areas.iter().all(|a| *a > 0.0));
             let largest = laplacian.stiffness.data().iter().fold(0.0f64, |m, w| m.max(w.abs()));
             assert!(largest.is_finite() && largest < 1e5, "{largest}");
@@ -257,7 +306,7 @@ mod tests {
         mesh.positions.extend(far.positions);
         mesh.normals.extend(far.normals);
         mesh.triangles.extend(far.triangles.iter().map(|t| t.map(|v| v + n)));
-        let laplacian = Laplacian::of(&mesh);
+        let laplacian = Laplacian::of(&mesh, Areas::VertexArea);
         let side = |v: u32| laplacian.component[laplacian.sample[v as usize] as usize];
         assert_eq!((side(0), side(n), laplacian.components()), (0, 1, 2));
         let field: Vec<DVec3> = (0..2 * n).map(|i| DVec3::splat(if i < n { 1.0 } else { -3.0 })).collect();

@@ -58,12 +58,9 @@ impl Pattern {
 }
 
 impl Factor<'_> {
-    /// Solves in place; columns of the matrix's size, one after the other.
-    pub fn solve(&self, columns: &mut [f64]) {
-        let rows = self.pattern.0.nrows();
-        let count = columns.len() / rows.max(1);
-        let mut memory = MemBuffer::new(self.pattern.0.solve_in_place_scratch::<f64>(count, Par::Seq));
-        let right = MatMut::from_column_major_slice_mut(columns, rows, count);
+    /// Solves for all columns in place: of three at once the factor is read as often as of one.
+    pub fn solve(&self, right: MatMut<f64>) {
+        let mut memory = MemBuffer::new(self.pattern.0.solve_in_place_scratch::<f64>(right.ncols(), Par::Seq));
         let factor = LdltRef::new(&self.pattern.0, &self.values);
         factor.solve_in_place_with_conj(Conj::No, right, Par::Seq, MemStack::new(&mut memory));
     }

@@ -6,8 +6,8 @@
 //! take the place of the Laplacian's. Slivers, whose eigenvalues are huge, cost nothing: a solve damps them to nothing.
 //!
 //! Steps are added until three kernels (Gaussian, exponential, that of a medium) with knees at both ends of the band change
-//! by no more than [`TOLERANCE`] from one check to the next. Columns that bring nothing new, as on a sphere, whose normals
-//! are nearly modes themselves, are left out.
+//! by no more than [`TOLERANCE`] from one round of the poles to the next. Columns that bring nothing new, as on a sphere,
+//! whose normals are nearly modes themselves, are left out.
 
 use faer::{Mat, MatRef, Side};
 use glam::DVec3;
@@ -20,24 +20,31 @@ use super::{MOST, Modes};
 use crate::geometry::laplacian::Laplacian;
 use crate::problem::{Cause, Problem, Tick};
 
-/// What kernels may change by from one check to the next, root mean square over the surface, of a field of length 1.
-const TOLERANCE: f64 = 1e-5;
+/// What kernels may change by in one round of the poles, root mean square over the surface, of a field of length 1: for
+/// pictures, which see no thousandth.
+pub const TOLERANCE: f64 = 2e-4;
 
-/// Blocks of three columns, at most, and how many between two checks.
+/// Blocks of three columns, at most.
 const STEPS: usize = 27;
-const CHECK: usize = 2;
 
-/// The modes of a field at the samples, for kernels whose knees lie in `band`, rad per edge; and by how much kernels still
-/// changed at the last check.
-pub fn modes(laplacian: &Laplacian, field: &[DVec3], band: (f64, f64), tick: Tick) -> Result<(Modes, f64), Problem> {
+/// The modes of a field at the samples, for kernels whose knees lie in `band`, rad per edge, until they change by no more
+/// than `tolerance`; and by how much they still did.
+pub fn modes(
+    laplacian: &Laplacian,
+    field: &[DVec3],
+    band: (f64, f64),
+    tolerance: f64,
+    tick: Tick,
+) -> Result<(Modes, f64), Problem> {
     super::on_one_thread();
     let mut space = Projected::new(laplacian, field);
-    let band = within(band, laplacian);
+    let lowest = lowest(laplacian);
+    let band = within(band, lowest);
     // Nothing, if all is constant; else unknown until two spaces were compared.
     let mut error = (space.size() > 0) as u32 as f64;
     if space.size() > 0 {
         let pattern = Pattern::of(&laplacian.stiffness)?;
-        let poles = poles(band);
+        let poles = poles(band, lowest);
         let mut factors = Vec::new();
         for pole in &poles {
             let factor = pattern.factor(&shifted(laplacian, *pole))?;
@@ -52,11 +59,11 @@ pub fn modes(laplacian: &Laplacian, field: &[DVec3], band: (f64, f64), tick: Tic
                 break;
             }
             tick(0.2 + 0.7 * step as f64 / STEPS as f64)?;
-            if step % CHECK == 0 {
+            if step % poles.len() == 0 {
                 let fields = space.filtered(band)?;
                 if let Some(last) = &last {
                     error = space.most_apart(last, &fields);
-                    if error < TOLERANCE {
+                    if error < tolerance {
                         break;
                     }
                 }
@@ -71,18 +78,23 @@ pub(super) fn breakdown(what: &str) -> Problem {
     Problem::new(Cause::Unfinished, what).hint("filter: Neighbours(…) needs no Laplacian")
 }
 
-/// A band no wider than the frequencies that there are: from one wavelength around the whole to beyond the finest.
-fn within(band: (f64, f64), laplacian: &Laplacian) -> (f64, f64) {
-    let lowest = 1.0 / laplacian.areas.iter().sum::<f64>().sqrt().max(1.0);
+/// About one wavelength around the whole, rad per edge.
+fn lowest(laplacian: &Laplacian) -> f64 {
+    1.0 / laplacian.areas.iter().sum::<f64>().sqrt().max(1.0)
+}
+
+/// A band no wider than the frequencies that there are: from the lowest to beyond the finest.
+fn within(band: (f64, f64), lowest: f64) -> (f64, f64) {
     let highest = 2.0 * super::FINEST;
     (band.0.clamp(lowest, highest), band.1.clamp(lowest, highest))
 }
 
-/// Poles xi, 1/edge²: from half the lowest knee, which the slow start of an exponential needs, to twice the highest one,
-/// which a Gaussian's end needs; a factor of 4 in frequency from one to the next at most.
-fn poles((low, high): (f64, f64)) -> Vec<f64> {
-    let (first, last) = (0.5 * low, 2.0 * high);
-    let count = ((last / first).log(4.0).ceil() as usize).max(1) + 1;
+/// Poles xi, 1/edge²: to twice the highest knee, which a Gaussian's end needs, and from below the lowest one, since an
+/// exponential has a corner at 0: the more of the spectrum lies below its knee, the lower. A factor of 4 in frequency from one
+/// to the next, or so.
+fn poles((low, high): (f64, f64), lowest: f64) -> Vec<f64> {
+    let (first, last) = ((2.0 * (lowest * low).sqrt()).min(0.5 * low), 2.0 * high);
+    let count = ((last / first).log(4.0).round() as usize).max(1) + 1;
     let ratio = (last / first).powf(1.0 / (count - 1) as f64);
     (0..count).rev().map(|i| (first * ratio.powi(i as i32)).powi(2)).collect()
 }
@@ -145,8 +157,8 @@ impl Projected<'_> {
         let (first, root) = (self.size(), &self.space.root);
         let mut block =
             Mat::from_fn(root.len(), first - self.last, |i, c| self.space.column(self.last + c)[i] * root[i]);
+        factor.solve(block.as_mut());
         for c in 0..block.ncols() {
-            factor.solve(block.col_as_slice_mut(c));
             block.col_as_slice_mut(c).iter_mut().zip(root).for_each(|(v, root)| *v *= root);
         }
         self.space.extend(block, None);
@@ -158,13 +170,13 @@ impl Projected<'_> {
     /// The rows and columns of the projected Laplacian from `first` on.
     fn project(&mut self, first: usize) {
         let size = self.size();
+        let images: Vec<f64> = (first..size).flat_map(|c| self.space.laplacian_of(self.space.column(c))).collect();
+        let rows = self.space.root.len();
+        let inside = self.space.coordinates(MatRef::from_column_major_slice(&images, rows, size - first));
         for c in first..size {
-            let image = self.space.laplacian_of(self.space.column(c));
-            let image = MatRef::from_column_major_slice(&image, image.len(), 1);
-            let inside = self.space.coordinates(image);
             for r in 0..size {
-                self.laplacian[(r, c)] = inside[(r, 0)];
-                self.laplacian[(c, r)] = inside[(r, 0)];
+                self.laplacian[(r, c)] = inside[(r, c - first)];
+                self.laplacian[(c, r)] = inside[(r, c - first)];
             }
         }
     }

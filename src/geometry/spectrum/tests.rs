@@ -70,10 +70,10 @@ fn most_apart(a: &[Vec3], b: &[Vec3]) -> f32 {
 
 /// The normals of a mesh through a kernel, by the Krylov engine, in f64 at the samples.
 fn filtered(mesh: &Mesh, kernel: &Kernel, knee: f64) -> (Laplacian, Vec<DVec3>) {
-    let laplacian = Laplacian::of(mesh);
+    let laplacian = Laplacian::of(mesh, Areas::VertexArea);
     let field = normals(mesh, &laplacian);
     let edge = laplacian.edge;
-    let (modes, _) = krylov::modes(&laplacian, &field, (knee * edge, knee * edge), &still).unwrap();
+    let (modes, _) = krylov::modes(&laplacian, &field, (knee * edge, knee * edge), 1e-5, &still).unwrap();
     let per_edge = Modes { lambda: modes.lambda.iter().map(|l| l / (edge * edge)).collect(), ..modes };
     let found = through(&laplacian, &field, &per_edge, kernel);
     (laplacian, found)
@@ -83,19 +83,19 @@ fn filtered(mesh: &Mesh, kernel: &Kernel, knee: f64) -> (Laplacian, Vec<DVec3>) 
 fn krylov_agrees_with_all_eigenpairs_for_every_smooth_kernel() {
     let cube = shapes::slab(DVec3::new(2.0, 1.0, 0.5), (16, 12));
     for (name, mesh) in [("bumpy", bumpy(3)), ("slivers", slivers()), ("box", cube)] {
-        let laplacian = Laplacian::of(&mesh);
+        let laplacian = Laplacian::of(&mesh, Areas::VertexArea);
         let field = normals(&mesh, &laplacian);
         let exact = harmonics::all(&laplacian, &field).unwrap();
         for step in [0.03, 0.125, 0.5, 2.0] {
             for ratio in [4.0, 16.0] {
                 let band = (step * OMEGA_M, ratio * step * OMEGA_M);
-                let (modes, error) = krylov::modes(&laplacian, &field, band, &still).unwrap();
-                assert!(modes.lambda.len() <= 81 && error < 1e-4, "{name} {step}: {error}");
+                let (modes, error) = krylov::modes(&laplacian, &field, band, krylov::TOLERANCE, &still).unwrap();
+                assert!(modes.lambda.len() <= 81 && error < krylov::TOLERANCE, "{name} {step}: {error}");
                 for knee in [band.0, (band.0 * band.1).sqrt(), band.1] {
                     for kernel in smooth_kernels(knee) {
                         let [a, b] = [&modes, &exact].map(|modes| through(&laplacian, &field, modes, &kernel));
                         let apart = worst(&a, &b);
-                        assert!(apart < 2e-4, "{name}, band {step} x {ratio}, {kernel:?}: {apart}");
+                        assert!(apart < 1e-3, "{name}, band {step} x {ratio}, {kernel:?}: {apart}");
                         // The estimate is a root mean square: a vertex may be farther off, but not by much more.
                         assert!(apart < 1e-4 + 60.0 * error, "{name}, {kernel:?}: {apart}, estimated {error}");
                     }
@@ -117,7 +117,7 @@ fn a_kernel_that_lets_all_pass_is_the_identity_on_any_mesh() {
     };
     let one = Mesh { triangles: vec![[0, 1, 2], [0, 0, 1]], ..shapes::sphere(1.0, 0) };
     for mesh in [bumpy(2), flat, slivers(), shapes::cuboid(DVec3::ONE), back_to_back, one, shapes::sphere(1.0, 3)] {
-        let basis = krylov_normals(&mesh, Band::PerEdge(0.5, 2.0), &still).unwrap();
+        let basis = krylov_normals(&mesh, Areas::VertexArea, Band::PerEdge(0.5, 2.0), &still).unwrap();
         let same = basis.filter(&Kernel::Gaussian { width: 0.0 }, 3.0);
         assert!(same.iter().zip(&mesh.normals).all(|(a, b)| a.distance(*b) < 2e-6));
         let other = basis.filter(&Kernel::Gaussian { width: 3.0 }, 3.0);
@@ -214,15 +214,15 @@ fn another_triangulation_gives_nearly_the_same_field() {
 fn halves_on_the_device_cost_little_and_interruptions_end_a_bake() {
     let mesh = bumpy(4);
     let kernel = Kernel::Medium { sigma_tr: 4.0 };
-    let basis = krylov_normals(&mesh, Band::PerUnit(2.0, 8.0), &still).unwrap();
+    let basis = krylov_normals(&mesh, Areas::VertexArea, Band::PerUnit(2.0, 8.0), &still).unwrap();
     let columns = basis.columns.iter().map(|v| f16::from_f32(*v).to_f32()).collect();
     let halves = Basis { columns, ..basis.clone() };
     let apart = most_apart(&basis.filter(&kernel, 1.0), &halves.filter(&kernel, 1.0));
     println!("halves instead of floats: {apart:.1e}");
     assert!(apart < 5e-4, "{apart}");
     let stop: Tick = &|_| Err(Problem::files("enough"));
-    assert!(krylov_normals(&mesh, Band::PerUnit(2.0, 8.0), stop).is_err());
-    assert!(harmonic_normals(&mesh, 1.0, stop).is_err());
+    assert!(krylov_normals(&mesh, Areas::VertexArea, Band::PerUnit(2.0, 8.0), stop).is_err());
+    assert!(harmonic_normals(&mesh, Areas::VertexArea, 1.0, stop).is_err());
 }
 
 #[test]
@@ -231,8 +231,8 @@ fn both_engines_agree_where_eigenpairs_reach() {
     // Wide enough that nothing is left at omega_m.
     let edge = mesh.mean_edge_length();
     let kernel = Kernel::Gaussian { width: 4.0 * edge / OMEGA_M };
-    let a = krylov_normals(&mesh, Band::PerEdge(0.1, 0.4), &still).unwrap();
-    let b = harmonic_normals(&mesh, f64::MAX, &still).unwrap();
+    let a = krylov_normals(&mesh, Areas::VertexArea, Band::PerEdge(0.1, 0.4), &still).unwrap();
+    let b = harmonic_normals(&mesh, Areas::VertexArea, f64::MAX, &still).unwrap();
     let apart = most_apart(&a.filter(&kernel, 1.0), &b.filter(&kernel, 1.0));
     assert!(apart < 1e-3, "{apart}");
     assert!((b.cut * edge / OMEGA_M - 1.0).abs() < 1e-2 && b.omega.iter().all(|omega| *omega <= b.cut * 1.001));
@@ -241,4 +241,25 @@ fn both_engines_agree_where_eigenpairs_reach() {
     let weights = b.weights(&narrow, 1.0);
     assert!((weights.high - narrow.mean(OMEGA_M / edge, FINEST / edge, 1.0)).abs() < 1e-3);
     assert!(weights.high > 0.2 && weights.high < 0.6, "{}", weights.high);
+}
+
+#[test]
+fn the_printed_equation_is_the_same_on_an_even_mesh_and_another_on_an_uneven_one() {
+    let kernel = Kernel::Gaussian { width: 0.5 };
+    let fields = |mesh: &Mesh| {
+        [Areas::VertexArea, Areas::MeanArea]
+            .map(|by| krylov_normals(mesh, by, Band::PerUnit(2.0, 2.0), &still).unwrap().filter(&kernel, 1.0))
+    };
+    let [own, mean] = fields(&shapes::sphere(1.0, 0));
+    assert!(most_apart(&own, &mean) < 1e-6, "{}", most_apart(&own, &mean));
+    // On the inside of a ring triangles are small: waves there count as longer, so that less of them is taken away.
+    let torus = shapes::torus(1.0, 0.4, (48, 24));
+    let [own, mean] = fields(&torus);
+    assert!(most_apart(&own, &mean) > 0.02, "{}", most_apart(&own, &mean));
+    let inside = (0..torus.positions.len()).min_by(|a, b| {
+        let axis = |v: usize| torus.positions[v].length();
+        axis(*a).total_cmp(&axis(*b))
+    });
+    let v = inside.expect("it has vertices");
+    assert!(mean[v].length() > own[v].length(), "{} {}", mean[v], own[v]);
 }

@@ -1,5 +1,6 @@
 //! The bakes and passes of filtered normals.
 
+use crate::geometry::laplacian::Areas;
 use crate::geometry::mesh::Mesh;
 use crate::geometry::neighbours;
 use crate::geometry::spectrum::kernel::Kernel;
@@ -52,6 +53,7 @@ impl Bake for NeighbourNormals {
 #[derive(Serialize)]
 pub(super) struct KrylovNormals {
     pub mesh: Slot<Mesh>,
+    pub laplacian: Areas,
     /// Where kernels have their knees: a coarse step, so that most edits of a kernel find the same basis.
     pub band: Band,
 }
@@ -65,7 +67,7 @@ impl Step for KrylovNormals {
         format!("the normals in a basis of their own, for smooth kernels around {}", self.band)
     }
     fn run(&self, run: &Run) -> Result<Basis, Problem> {
-        krylov_normals(&run.get(self.mesh), self.band, &|share| run.tick(share))
+        krylov_normals(&run.get(self.mesh), self.laplacian, self.band, &|share| run.tick(share))
     }
 }
 
@@ -77,6 +79,7 @@ impl Bake for KrylovNormals {
 #[derive(Serialize)]
 pub(super) struct HarmonicNormals {
     pub mesh: Slot<Mesh>,
+    pub laplacian: Areas,
     /// Frequencies beyond are not needed, rad per unit.
     pub highest: f64,
     #[serde(skip)]
@@ -92,7 +95,7 @@ impl Step for HarmonicNormals {
         format!("the normals in the mesh's eigenpairs, since {}", self.why)
     }
     fn run(&self, run: &Run) -> Result<Basis, Problem> {
-        harmonic_normals(&run.get(self.mesh), self.highest, &|share| run.tick(share))
+        harmonic_normals(&run.get(self.mesh), self.laplacian, self.highest, &|share| run.tick(share))
     }
 }
 
