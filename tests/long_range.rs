@@ -172,7 +172,7 @@ fn a_ball_in_even_light_is_evenly_bright_from_everywhere() {
             // The eye within reach of the surface: patches fill the picture, and its rim cuts them.
             (dvec3(0.0, 0.0, 1.3), dvec3(0.0, 0.0, 1.0), 0.05),
             (dvec3(0.0, 0.0, 1.1), dvec3(0.3, 0.0, 1.0), 0.08),
-            (dvec3(0.0, 0.0, 1.02), dvec3(0.3, 0.0, 1.0), 0.12),
+            (dvec3(0.0, 0.0, 1.02), dvec3(0.3, 0.0, 1.0), 0.2),
         ] {
             let picture = studio.scattered(&ball(eye, target, mm, "LongRange()"));
             let lit: Vec<DVec3> =

@@ -62,7 +62,7 @@ fn is_seen(point: vec3f, normal: vec3f, radius: f32) -> bool {
         return false;
     }
     // The same sheet: a leaf may be a little bent, and the pixel's centre lies elsewhere on it.
-    let apart = abs(dot(found.xyz - point, normal));
+    let apart = abs(dot(found.xyz - point, flat_normal));
     return dot(normal, flat_normal) > 0.0 && apart < 0.5 * radius + depth * camera.pixel;
 }
 
@@ -89,7 +89,8 @@ fn compute(@builtin(global_invocation_id) id: vec3u) {
     }
     middle /= area;
 
-    // The quarters of the patch as the camera sees it: what is not seen of each.
+    // What is not seen of the patch, to the left, to the right, below and above its middle: a frame around the picture falls
+    // into its sides.
     var quarters = array<vec4f, 4>();
     for (var l = spans[2u * i]; l < spans[2u * i + 1u]; l++) {
         let leaf = leaf_at(l);
@@ -106,7 +107,9 @@ fn compute(@builtin(global_invocation_id) id: vec3u) {
             let point = leaf.middle + r * (cos(turn) * u + sin(turn) * v);
             if !is_seen(point, leaf.normal, radius) {
                 let away = point - middle;
-                let quarter = u32(dot(away, camera.right) > 0.0) + 2u * u32(dot(away, camera.up) > 0.0);
+                let x = dot(away, camera.right);
+                let y = dot(away, camera.up);
+                let quarter = select(2u + u32(y > 0.0), u32(x > 0.0), abs(x) > abs(y));
                 quarters[quarter] += leaf.area / count * vec4f(away, 1.0);
             }
         }
