@@ -9,10 +9,10 @@
 //! What counts where differs from the paper's criteria [eqs. 2, 3, 8], which lose what faces the camera but is hidden
 //! or out of the picture, and count twice what is seen at a steep angle. Here points all over each patch are looked up in
 //! the picture, and what is not seen of it counts: together the two parts have every piece of the surface once, from any
-//! place. A patch that is seen in part sends its light as up to four disks, each a quarter of the patch as the camera sees
-//! it: what is left around the picture, or beside it, is not put where the picture is. The distance to a disk [eq. 9] is
-//! replaced as well: an even slab comes out right whether its patches are small or not, where the paper's rule makes it
-//! several times too bright.
+//! place. A patch that is seen in part sends its light as up to four disks, for what is not seen of it to the left, to the
+//! right, above and below its middle: what is left around the picture, or beside it, is not put where the picture is. The
+//! distance to a disk [eq. 9] is replaced as well: an even slab comes out right whether its patches are small or not, where
+//! the paper's rule makes it several times too bright.
 //!
 //! - `splats` is about how many patches there are; more make shadows that are seen through the object sharper.
 //! - `n`, `n_l`, `layers` and `brighten` are those of `ScreenSpace`.
@@ -25,7 +25,8 @@
 //!
 //! Fails where the profile does: light is taken to cross the inside of things as if they were flat and endless, so thin
 //! parts come out too dark, and hollow ones glow. `scenes/long-range/back-lit.ron` shows it against `volume`. Shadows that
-//! are seen through a thing are as coarse as its patches.
+//! are seen through a thing are as coarse as its patches. So near to a surface that one patch fills the picture, it comes
+//! out up to a tenth too bright or too dark, and tubes of few sides come out darker than they are.
 //!
 //! ```
 //! use diaphane::scene::TechniqueText;
