@@ -53,7 +53,8 @@ fn is_seen(point: vec3f, normal: vec3f, radius: f32) -> bool {
     let clip = project(camera, point);
     let size = textureDimensions(position_map);
     let at = floor((0.5 + vec2f(0.5, -0.5) * clip.xy / clip.w) * vec2f(size));
-    if depth <= 0.0 || any(at < vec2f(0.0)) || any(at >= vec2f(size)) {
+    let faces_away = dot(point, normal) >= 0.0;
+    if faces_away || depth <= 0.0 || any(at < vec2f(0.0)) || any(at >= vec2f(size)) {
         return false;
     }
     let found = textureLoad(position_map, vec2u(at), 0);
