@@ -26,7 +26,7 @@
 //! Fails where the profile does: light is taken to cross the inside of things as if they were flat and endless, so thin
 //! parts come out too dark, and hollow ones glow. `scenes/long-range/back-lit.ron` shows it against `volume`. Shadows that
 //! are seen through a thing are as coarse as its patches. So near to a surface that one patch fills the picture, it comes
-//! out up to a tenth too bright or too dark, and tubes of few sides come out darker than they are.
+//! out a tenth too bright or too dark, at a fiftieth of a ball's radius a fifth.
 //!
 //! ```
 //! use diaphane::scene::TechniqueText;
