@@ -84,8 +84,8 @@ fn near_the_eye_and_off_the_picture_the_far_part_takes_over() {
         let whole = middle(&studio.picture(&plate(eye, 48, "LongRange()", DOWN, ""))) * PI / 2.0 / albedo;
         let seen = middle(&studio.picture(&plate(eye, 48, "ScreenSpace()", DOWN, ""))) * PI / 2.0 / albedo;
         println!("from {height}: {whole:.3}, {seen:.3} of it on the screen");
-        // What is left of a patch that is cut by the picture's rim still lies at its middle.
-        assert!((whole - 1.0).abs().max_element() < 0.2, "from {height}: {whole}");
+        // What is left of a patch around the picture lies beside it, as disks and not as a frame.
+        assert!((whole - 1.0).abs().max_element() < 0.12, "from {height}: {whole}");
         assert!(seen.z < whole.z, "from {height}: {seen}");
     }
 }
@@ -166,11 +166,13 @@ fn a_ball_in_even_light_is_evenly_bright_from_everywhere() {
             (dvec3(0.0, 0.0, 5.0), DVec3::ZERO, 0.08),
             (dvec3(3.0, 4.0, 12.0), DVec3::ZERO, 0.08),
             // Six pixels wide: of those at the rim nothing is known.
-            (dvec3(0.0, 0.0, 40.0), DVec3::ZERO, 0.25),
+            (dvec3(0.0, 0.0, 40.0), DVec3::ZERO, 0.13),
             // Half of it off the picture.
             (dvec3(0.0, 0.0, 4.0), dvec3(1.3, 0.0, 0.0), 0.08),
             // The eye within reach of the surface: patches fill the picture, and its rim cuts them.
-            (dvec3(0.0, 0.0, 1.1), dvec3(0.3, 0.0, 1.0), 0.5),
+            (dvec3(0.0, 0.0, 1.3), dvec3(0.0, 0.0, 1.0), 0.05),
+            (dvec3(0.0, 0.0, 1.1), dvec3(0.3, 0.0, 1.0), 0.12),
+            (dvec3(0.0, 0.0, 1.02), dvec3(0.3, 0.0, 1.0), 0.25),
         ] {
             let picture = studio.scattered(&ball(eye, target, mm, "LongRange()"));
             let lit: Vec<DVec3> =

@@ -24,9 +24,6 @@ struct Vertex {
 #if ENVIRONMENT
     @location(3) environment: vec3f,
 #endif
-#if PATCHES
-    @location(4) @interpolate(flat, first) patch_group: f32,
-#endif
 }
 
 @vertex
@@ -37,13 +34,6 @@ fn vertex(
 #if ENVIRONMENT
     @location(2) environment: vec4f,
 #endif
-#if PATCHES
-#if ENVIRONMENT
-    @location(3) patch_group: f32,
-#else
-    @location(2) patch_group: f32,
-#endif
-#endif
 ) -> Vertex {
     var out: Vertex;
     out.position = eye_from_object(objects[index], position);
@@ -53,22 +43,12 @@ fn vertex(
 #if ENVIRONMENT
     out.environment = environment.rgb;
 #endif
-#if PATCHES
-    out.patch_group = patch_group;
-#endif
     return out;
 }
 
-struct Entered {
-    // Transmitted irradiance, and the area of surface that the pixel covers.
-    @location(0) light: vec4f,
-#if PATCHES
-    @location(1) patch_group: f32,
-#endif
-}
-
+// Transmitted irradiance, and the area of surface that the pixel covers.
 @fragment
-fn fragment(in: Vertex) -> Entered {
+fn fragment(in: Vertex) -> @location(0) vec4f {
     let object = objects[in.object];
     let pixel = vec2i(in.clip.xy);
     var entered = vec3f(0.0);
@@ -88,10 +68,5 @@ fn fragment(in: Vertex) -> Entered {
     }
 #endif
     let flat_normal = unpack_direction(textureLoad(packed_map, pixel, 0).y);
-    var out: Entered;
-    out.light = vec4f(entered, pixel_area(camera, in.position, flat_normal));
-#if PATCHES
-    out.patch_group = in.patch_group;
-#endif
-    return out;
+    return vec4f(entered, pixel_area(camera, in.position, flat_normal));
 }

@@ -64,13 +64,8 @@ uniform! {
     }
 }
 
-/// Transmitted irradiance (rgb) and area of surface (a) of every pixel, `rgba32float`. With a stream that tells each
-/// vertex's patch, a second map holds the patch of each triangle's first vertex, `r32float`.
-pub(super) fn entered(
-    plan: &mut Plan,
-    surface: &Surface,
-    mut patches: impl FnMut(&mut Plan, &Member) -> Option<Slot<Buffer>>,
-) -> Result<Slot<Images>, Problem> {
+/// Transmitted irradiance (rgb) and area of surface (a) of every pixel, `rgba32float`.
+pub(super) fn entered(plan: &mut Plan, surface: &Surface) -> Result<Slot<Images>, Problem> {
     let mut flags = Vec::new();
     let mut binds =
         vec![("camera", surface.camera()), ("objects", surface.objects()), ("packed_map", surface.packed())];
@@ -82,8 +77,7 @@ pub(super) fn entered(
         flags.push("SHADOWS");
         binds.push(("visibility", visibility));
     }
-    let mut targets = vec![(Format::Rgba32Float, Blend::Replace)];
-    let (mut environment, mut in_patches) = (false, false);
+    let mut environment = false;
     let mut draws = Vec::new();
     for member in surface.members() {
         let normals = surface.normals(plan, &member);
@@ -92,25 +86,17 @@ pub(super) fn entered(
             environment = true;
             streams.push(sky);
         }
-        if let Some(patches) = patches(plan, &member) {
-            in_patches = true;
-            streams.push(patches);
-        }
         draws.push(surface.draw(plan, &member, streams));
     }
     if environment {
         flags.push("ENVIRONMENT");
-    }
-    if in_patches {
-        flags.push("PATCHES");
-        targets.push((Format::R32Float, Blend::Replace));
     }
     Ok(plan.add(Raster {
         name: "technique.entered",
         about: format!("what enters {} at each pixel", counted(draws.len(), "thing")),
         shader: surface.shader("techniques/entered.wgsl", &flags)?,
         size: surface.size(),
-        targets,
+        targets: vec![(Format::Rgba32Float, Blend::Replace)],
         depth: surface.depth(),
         layers: vec![Layer::meshes(draws)],
         array: false,

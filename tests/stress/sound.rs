@@ -17,7 +17,7 @@ const SIGNED: [(&str, &str); 14] = [
     ("frame.through", "a depth: where a ray leaves less where it enters"),
     ("profile.disk_means", "logarithms"),
     ("screen.sums", "places"),
-    ("long_range.splats", "places, normals, and area that pixels counted too much"),
+    ("long_range.splats", "places and normals"),
     ("long_range.far", "the pixel that a block's light is for, -1 for none, beside the light"),
     ("sky.light", "directions, beside the light from there"),
     ("sky.lamps", "directions, likewise"),

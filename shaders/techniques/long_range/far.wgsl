@@ -15,6 +15,7 @@ struct Whose {
 @group(0) @binding(3) var<storage, read_write> blocks: array<vec4f>;
 
 const BLOCK: u32 = 4u;
+const PI: f32 = 3.14159265358979;
 
 // The block's pixels from the middle outwards.
 fn spiral(i: u32) -> vec2u {
@@ -50,11 +51,16 @@ fn compute(@builtin(global_invocation_id) id: vec3u) {
     if index >= 0.0 {
         let reach = kernel_reach();
         for (var k = 0u; k < arrayLength(&splats); k++) {
-            let splat = splats[k];
-            let offset = found.xyz - splat.place;
-            // A splat that does not count has no radius.
-            if splat.radius > 0.0 && dot(offset, offset) < (reach + splat.radius) * (reach + splat.radius) {
-                sum += splat.area * splat.light * disk_mean_across(offset, splat.normal, splat.radius);
+            for (var d = 0; d < 4; d++) {
+                let disk = splats[k].disks[d];
+                if disk.w == 0.0 {
+                    break;
+                }
+                let offset = found.xyz - disk.xyz;
+                let radius = sqrt(disk.w / PI);
+                if dot(offset, offset) < (reach + radius) * (reach + radius) {
+                    sum += disk.w * splats[k].light * disk_mean_across(offset, splats[k].normal, radius);
+                }
             }
         }
     }

@@ -1,12 +1,9 @@
-// A patch of surface that sends light as one disk. Eye space.
+// A patch of surface, and what of it sends light: none of it, all of it as one disk, or up to four disks. Eye space.
 
 struct Splat {
-    place: vec3f,
-    radius: f32,
-    normal: vec3f,
-    // The area that counts: what the camera does not see of it.
-    area: f32,
     // Transmitted irradiance.
     light: vec3f,
-    unused: f32,
+    normal: vec3f,
+    // Each disk's middle (xyz) and area (w); 0 for no more of them.
+    disks: array<vec4f, 4>,
 }

@@ -7,11 +7,12 @@
 //! to one pixel of each 4 x 4. A cubic spline, kept from leaking over edges by depth, brings it to all of them.
 //!
 //! What counts where differs from the paper's criteria [eqs. 2, 3, 8], which lose what faces the camera but is hidden
-//! or out of the picture, and count twice what is seen at a steep angle. Here the pixels' areas are added up for each
-//! patch, and the patch counts for what is left of its own: together the two parts have every piece of the surface
-//! once, from any place. Of a patch less than some ten pixels wide that sum says little: its middle is looked up in
-//! the picture. The distance to a disk [eq. 9] is replaced as well: an even slab comes out right whether its patches
-//! are small or not, where the paper's rule makes it several times too bright.
+//! or out of the picture, and count twice what is seen at a steep angle. Here points all over each patch are looked up in
+//! the picture, and what is not seen of it counts: together the two parts have every piece of the surface once, from any
+//! place. A patch that is seen in part sends its light as up to four disks, for what is not seen of it to the left, to the
+//! right, above and below its middle: what is left around the picture, or beside it, is not put where the picture is. The
+//! distance to a disk [eq. 9] is replaced as well: an even slab comes out right whether its patches are small or not, where
+//! the paper's rule makes it several times too bright.
 //!
 //! - `splats` is about how many patches there are; more make shadows that are seen through the object sharper.
 //! - `n`, `n_l`, `layers` and `brighten` are those of `ScreenSpace`.
@@ -19,13 +20,13 @@
 //! Claims: pictures close to a traced one at any scattering distance and for any lights, for meshes that deform as they
 //! like: nothing is baked but which triangles make a patch.
 //!
-//! Costs: `ScreenSpace`, one pass over the pixels' areas, and `splats` samples for one pixel in sixteen. Sixteen lights cost
-//! hardly more than one, since light is looked up once per pixel and patch.
+//! Costs: `ScreenSpace`, and `splats` samples for one pixel in sixteen. Sixteen lights cost hardly more than one, since
+//! light is looked up once per pixel and patch.
 //!
 //! Fails where the profile does: light is taken to cross the inside of things as if they were flat and endless, so thin
 //! parts come out too dark, and hollow ones glow. `scenes/long-range/back-lit.ron` shows it against `volume`. Shadows that
-//! are seen through a thing are as coarse as its patches. Of a patch that the picture's rim cuts, what is not seen still lies
-//! at its middle: near enough to a surface that a patch fills the picture, it comes out a tenth to a quarter too bright.
+//! are seen through a thing are as coarse as its patches. So near to a surface that one patch fills the picture, it comes
+//! out a tenth too bright or too dark, at a fiftieth of a ball's radius a fifth.
 //!
 //! ```
 //! use diaphane::scene::TechniqueText;
@@ -39,11 +40,11 @@ mod patches;
 use super::screen::{self, Brighten, Pattern, within};
 use super::{Scattered, Technique, kernel};
 use crate::frame::{Member, Surface};
-use crate::gpu::{Bind, Buffer, Compute, Count, Dispatch, Dispatches, Images};
+use crate::gpu::{Bind, Buffer, Compute, Count, Dispatch, Dispatches};
 use crate::problem::Problem;
 use crate::store::{Plan, Slot};
 use crate::uniform;
-use patches::{Cut, LeafPoints, List, Patches, UploadAreas, UploadPatches};
+use patches::{Cut, LeafPoints, Patches, UploadAreas, UploadSpans};
 use serde::Deserialize;
 
 /// See the module.
@@ -76,18 +77,12 @@ uniform! {
 impl Technique for LongRange {
     fn plan(&self, plan: &mut Plan, surface: &Surface) -> Result<Scattered, Problem> {
         let LongRange { splats, n, n_l, layers, brighten } = *self;
-        let cut = |plan: &mut Plan, member: &Member| {
-            let mesh = surface.rest(plan, member);
-            plan.bake(Cut { mesh, wanted: splats })
-        };
-        let entered = screen::entered(plan, surface, |plan, member| {
-            let patches = cut(plan, member);
-            Some(plan.add(UploadPatches { patches, list: List::OfVertex }))
-        })?;
+        let entered = screen::entered(plan, surface)?;
         let mut picture = None;
         for member in surface.members() {
-            let patches = cut(plan, &member);
-            let far = far(plan, surface, &member, entered, patches)?;
+            let mesh = surface.rest(plan, &member);
+            let patches = plan.bake(Cut { mesh, wanted: splats });
+            let far = far(plan, surface, &member, patches)?;
             let pattern = Pattern { n, n_l, layers, brighten };
             picture = screen::gather(plan, surface, &member, entered, &pattern, far, picture)?;
         }
@@ -100,42 +95,24 @@ fn far(
     plan: &mut Plan,
     surface: &Surface,
     member: &Member,
-    entered: Slot<Images>,
     patches: Slot<Patches>,
 ) -> Result<Option<Slot<Buffer>>, Problem> {
     let Some(kernel) = kernel::binds(plan, surface, member.material) else { return Ok(None) };
     let whose = || ("whose", Bind::uniform(&Whose { object: surface.place(member) }));
     let (width, height) = surface.size();
 
-    let of_groups = plan.add(UploadAreas { mesh: member.mesh, patches, of_groups: true });
-    let seen = plan.add(Dispatches {
-        name: "long_range.seen",
-        about: format!("how much of each patch of `{}` is seen", member.name),
-        shader: surface.shader("techniques/long_range/seen.wgsl", &[])?,
-        output: ("seen", 4),
-        count: Count::Of(of_groups, 4),
-        dispatches: vec![Dispatch { count: width as u64 * height as u64, binds: Vec::new() }],
-        binds: vec![
-            whose(),
-            ("position_map", surface.position()),
-            ("entered_map", Bind::Texture(entered, 0)),
-            ("group_map", Bind::Texture(entered, 1)),
-            ("areas", Bind::Buffer(of_groups)),
-        ],
-    });
-
     let points = plan.add(LeafPoints { mesh: member.mesh, patches });
     let irradiance = surface.irradiance(plan, member, points)?;
     let [positions, normals] = surface.points(plan, points);
-    let areas = plan.add(UploadAreas { mesh: member.mesh, patches, of_groups: false });
-    let spans = plan.add(UploadPatches { patches, list: List::Spans });
+    let areas = plan.add(UploadAreas { mesh: member.mesh, patches });
+    let spans = plan.add(UploadSpans { patches });
     let splats = plan.add(Compute {
         name: "long_range.splats",
         about: format!("the light of each patch of `{}` that is not seen", member.name),
         shader: surface.shader("techniques/long_range/splats.wgsl", &[])?,
-        output: ("splats", 48),
+        output: ("splats", 96),
         over: spans,
-        over_stride: 12,
+        over_stride: 8,
         binds: vec![
             whose(),
             ("objects", surface.objects()),
@@ -144,9 +121,9 @@ fn far(
             ("positions", Bind::Buffer(positions)),
             ("normals", Bind::Buffer(normals)),
             ("irradiance", Bind::Buffer(irradiance)),
-            ("seen", Bind::Buffer(seen)),
             ("camera", surface.camera()),
             ("position_map", surface.position()),
+            ("packed_map", surface.packed()),
         ],
     });
 

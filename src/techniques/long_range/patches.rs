@@ -1,9 +1,8 @@
 //! The surface cut into patches, each of which sends its light as one splat.
 //!
 //! The mesh is decimated, and every vertex belongs to the coarse triangle that lies nearest to it, and to the side it
-//! faces. A triangle of the mesh belongs to the group of its first vertex: pixels can tell that group, so that what the
-//! camera sees of it can be taken away. A patch is all of a group, but for triangles that are longer than patches should
-//! be: those are halved until they are not [Maisch2020, section 8.1], and each piece is a patch of the same group.
+//! faces. A triangle of the mesh belongs to the patch of its first vertex, but for those that are longer than patches
+//! should be: they are halved until they are not [Maisch2020, section 8.1], and each piece is a patch of its own.
 //!
 //! All of it is baked for the shape at rest, as vertex numbers and barycentric coordinates, and holds however it deforms.
 
@@ -32,11 +31,6 @@ pub(super) struct Patches {
     leaves: Vec<Leaf>,
     /// Where each patch's leaves begin; one more for where the last ones end.
     starts: Vec<u32>,
-    /// Each patch's group.
-    groups: Vec<u32>,
-    /// Each vertex's group.
-    of_vertex: Vec<u32>,
-    group_count: u32,
 }
 
 /// About `wanted` patches of a mesh.
@@ -67,30 +61,26 @@ impl Bake for Cut {
 fn cut(mesh: &Mesh, wanted: u32) -> Patches {
     let area = mesh.area();
     if mesh.triangles.is_empty() || area == 0.0 {
-        return Patches { starts: vec![0], ..Patches::default() };
+        return Patches { leaves: Vec::new(), starts: vec![0] };
     }
     let (of_vertex, group_count) = groups(mesh, wanted);
     // Twice as long as the side of a square patch.
     let longest = 2.0 * (area / wanted as f64).sqrt();
     let mut whole: Vec<Vec<Leaf>> = vec![Vec::new(); group_count as usize];
-    let mut pieces: Vec<(u32, Leaf)> = Vec::new();
+    let mut pieces: Vec<Leaf> = Vec::new();
     for (t, triangle) in mesh.triangles.iter().enumerate() {
-        let group = of_vertex[triangle[0] as usize];
-        let corners = mesh.corners(t);
         let mut leaves = Vec::new();
-        halve(corners, [Vec2::ZERO, Vec2::X, Vec2::Y], 1.0, longest, &mut |at, share| {
+        halve(mesh.corners(t), [Vec2::ZERO, Vec2::X, Vec2::Y], 1.0, longest, &mut |at, share| {
             leaves.push(Leaf { triangle: t as u32, at, share })
         });
         match leaves.len() {
-            1 => whole[group as usize].append(&mut leaves),
-            _ => pieces.extend(leaves.into_iter().map(|leaf| (group, leaf))),
+            1 => whole[of_vertex[triangle[0] as usize] as usize].append(&mut leaves),
+            _ => pieces.append(&mut leaves),
         }
     }
-    let whole = whole.into_iter().enumerate().map(|(group, leaves)| (group as u32, leaves));
-    let pieces = pieces.into_iter().map(|(group, leaf)| (group, vec![leaf]));
-    let mut patches = Patches { starts: vec![0], of_vertex, group_count, ..Patches::default() };
-    for (group, leaves) in whole.chain(pieces).filter(|(_, leaves)| !leaves.is_empty()) {
-        patches.groups.push(group);
+    let pieces = pieces.into_iter().map(|leaf| vec![leaf]);
+    let mut patches = Patches { leaves: Vec::new(), starts: vec![0] };
+    for leaves in whole.into_iter().chain(pieces).filter(|leaves| !leaves.is_empty()) {
         patches.leaves.extend(leaves);
         patches.starts.push(patches.leaves.len() as u32);
     }
@@ -115,8 +105,7 @@ fn groups(mesh: &Mesh, wanted: u32) -> (Vec<u32>, u32) {
     let triangles: Vec<[u32; 3]> = coarse.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
     let coarse = Mesh { positions: on_grid.clone(), triangles, ..Mesh::default() };
     let nearest = Nearest::new(&coarse);
-    // Vertices at one place may belong to several sides of an edge, and those to several of a thin sheet: what is seen of
-    // one side says nothing of the other.
+    // Vertices at one place may belong to several sides of an edge, and those to several of a thin sheet: a disk has one.
     let side = |normal: Vec3| {
         let rounded = (1024.0 * normal).round();
         let axis = rounded.abs().max_position();
@@ -181,22 +170,13 @@ impl Step for LeafPoints {
     }
 }
 
-/// A list of the patches, on the device.
+/// Where each patch's leaves begin and end, on the device.
 #[derive(Serialize)]
-pub(super) struct UploadPatches {
+pub(super) struct UploadSpans {
     pub patches: Slot<Patches>,
-    pub list: List,
 }
 
-#[derive(Clone, Copy, Serialize)]
-pub(super) enum List {
-    /// Per patch: where its leaves begin and end, and its group.
-    Spans,
-    /// As floats: a vertex stream.
-    OfVertex,
-}
-
-impl Step for UploadPatches {
+impl Step for UploadSpans {
     type Output = Buffer;
     fn name(&self) -> &'static str {
         "gpu.upload"
@@ -206,27 +186,16 @@ impl Step for UploadPatches {
     }
     fn run(&self, run: &Run) -> Result<Buffer, Problem> {
         let patches = run.get(self.patches);
-        let gpu: &Gpu = run.host();
-        Ok(match self.list {
-            List::Spans => {
-                let span = |(pair, group): (&[u32], &u32)| [pair[0], pair[1], *group];
-                let spans: Vec<[u32; 3]> = patches.starts.windows(2).zip(&patches.groups).map(span).collect();
-                Buffer::new(gpu, bytemuck::cast_slice(&spans))
-            }
-            List::OfVertex => {
-                let floats: Vec<f32> = patches.of_vertex.iter().map(|&group| group as f32).collect();
-                Buffer::new(gpu, bytemuck::cast_slice(&floats))
-            }
-        })
+        let spans: Vec<[u32; 2]> = patches.starts.windows(2).map(|pair| [pair[0], pair[1]]).collect();
+        Ok(Buffer::new(run.host::<Gpu>(), bytemuck::cast_slice(&spans)))
     }
 }
 
-/// Areas on the mesh as it is now, on the device: of the leaves, or of whole groups. Object space.
+/// The leaves' areas on the mesh as it is now, on the device. Object space.
 #[derive(Serialize)]
 pub(super) struct UploadAreas {
     pub mesh: Slot<Mesh>,
     pub patches: Slot<Patches>,
-    pub of_groups: bool,
 }
 
 impl Step for UploadAreas {
@@ -240,18 +209,8 @@ impl Step for UploadAreas {
     fn run(&self, run: &Run) -> Result<Buffer, Problem> {
         let (mesh, patches) = (run.get(self.mesh), run.get(self.patches));
         let faces = mesh.face_areas();
-        let areas: Vec<f32> = match self.of_groups {
-            false => patches.leaves.iter().map(|leaf| faces[leaf.triangle as usize] as f32 * leaf.share).collect(),
-            true => {
-                let mut areas = vec![0.0; patches.group_count as usize];
-                for (triangle, area) in mesh.triangles.iter().zip(&faces) {
-                    if let Some(&group) = patches.of_vertex.get(triangle[0] as usize) {
-                        areas[group as usize] += area;
-                    }
-                }
-                areas.into_iter().map(|area: f64| area as f32).collect()
-            }
-        };
+        let area = |leaf: &Leaf| faces[leaf.triangle as usize] as f32 * leaf.share;
+        let areas: Vec<f32> = patches.leaves.iter().map(area).collect();
         Ok(Buffer::new(run.host::<Gpu>(), bytemuck::cast_slice(&areas)))
     }
 }
@@ -270,17 +229,12 @@ mod tests {
             shapes::slab(DVec3::new(4.0, 4.0, 0.2), (30, 30)),
         ] {
             let patches = cut(&mesh, 500);
-            assert!((150..3000).contains(&patches.groups.len()), "{} patches", patches.groups.len());
-            assert_eq!(patches.starts.len(), patches.groups.len() + 1);
+            let count = patches.starts.len() - 1;
+            assert!((150..3000).contains(&count), "{count} patches");
             // Each triangle's pieces add up to it, so that areas do, deformed or not.
             let mut shares = vec![0.0; mesh.triangles.len()];
             patches.leaves.iter().for_each(|leaf| shares[leaf.triangle as usize] += leaf.share);
             assert!(shares.iter().all(|share| (share - 1.0f32).abs() < 1e-5));
-            for (patch, group) in patches.groups.iter().enumerate() {
-                let leaves = &patches.leaves[patches.starts[patch] as usize..patches.starts[patch + 1] as usize];
-                let first = |leaf: &Leaf| mesh.triangles[leaf.triangle as usize][0];
-                assert!(leaves.iter().all(|leaf| patches.of_vertex[first(leaf) as usize] == *group));
-            }
             // No patch is much wider than it should be.
             let side = (mesh.area() / 500.0).sqrt();
             for (patch, pair) in patches.starts.windows(2).enumerate() {
@@ -294,6 +248,6 @@ mod tests {
             }
             assert_eq!(cut(&mesh, 500), patches);
         }
-        assert_eq!(cut(&Mesh::default(), 100).groups.len(), 0);
+        assert_eq!(cut(&Mesh::default(), 100), Patches { leaves: Vec::new(), starts: vec![0] });
     }
 }
