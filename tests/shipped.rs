@@ -38,7 +38,7 @@ fn sound(path: &Path) -> Option<(Scene, usize)> {
 
 #[test]
 fn every_scene_is_sound_and_says_what_it_is_for() {
-    let all = ["scenes", "scenes/bench", "scenes/long-range"].map(files_in).concat();
+    let all = ["scenes", "scenes/bench", "scenes/layers", "scenes/long-range"].map(files_in).concat();
     assert!(all.len() >= 14, "scenes are gone: {all:?}");
     for path in all {
         let text = std::fs::read_to_string(&path).expect("it was listed");
