@@ -239,8 +239,8 @@ fn scattered_between(ray: Ray, stratum: Stratum, start: f32, to: f32, near: vec3
     let above = ray.origin + middle * ray.direction + plane.w * plane.xyz;
     var sum = vec3f(0.0);
     for (var l = 0u; l < sources(); l++) {
-        let source = source(l, pixel);
-        for (var i = 0; i < source.samples; i++) {
+        let shining = source(l, pixel);
+        for (var i = 0; i < shining.samples; i++) {
             let light_in = arriving(l, i, above, plane.xyz);
             // Behind its plane a point is unlit.
             let cos_in = dot(plane.xyz, light_in.direction);
@@ -262,7 +262,7 @@ fn scattered_between(ray: Ray, stratum: Stratum, start: f32, to: f32, near: vec3
             let through = mean_exps(first, far + down[1] / cos_below);
 #endif
             let turned = phase(stratum, clamp(-dot(to_light, ray.direction), -1.0, 1.0));
-            sum += source.seen * enters * light_in.irradiance * turned * through;
+            sum += shining.seen * enters * light_in.irradiance * turned * through;
         }
     }
     return (to - start) * stratum.sigma_s * sum;

@@ -110,12 +110,12 @@ fn scattered_often(ray: Ray, body: Body, pixel: vec2i) -> vec3f {
     let wide = widened(ray);
     var sum = vec3f(0.0);
     for (var l = 0u; l < sources(); l++) {
-        let source = source(l, pixel);
-        for (var i = 0; i < source.samples; i++) {
+        let shining = source(l, pixel);
+        for (var i = 0; i < shining.samples; i++) {
             let light_in = arriving(l, i, ray.origin, ray.normal);
             let cos = min(1.0, dot(ray.normal, light_in.direction));
             if cos > 0.0 && any(light_in.irradiance > vec3f(0.0)) {
-                let enters = source.seen * cos * (1.0 - fresnel_dielectric(cos, ray.eta));
+                let enters = shining.seen * cos * (1.0 - fresnel_dielectric(cos, ray.eta));
                 sum += enters * light_in.irradiance * returned_often(wide, body, cos);
             }
         }
