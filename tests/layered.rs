@@ -341,12 +341,13 @@ fn white_layers_send_back_all_that_an_even_sky_sends() {
         studio.write("thing.ron", material(ior, &constant(layers), grey(0.0, 2.0)));
         let image = studio.scattered(&slab(ABOVE, "Environment(radiance: 1)", "Layered(multiple: true)"));
         let off = error(&image, ABOVE, |view| DVec3::splat(1.0 - fresnel_dielectric(-view.y, ior)));
-        assert!(off < 0.06, "index {ior}, {} layers: {off:.4}", layers.len());
+        // Of light that scattered often, all directions get the same.
+        assert!(off < 0.12, "index {ior}, {} layers: {off:.4}", layers.len());
         assert!(image.pixels.iter().flatten().all(|value| *value < 1.02));
     }
     studio.write("thing.ron", material(1.4, &[], grey(0.02, 2.0)));
     let image = studio.scattered(&slab(ABOVE, "Environment(radiance: 1)", "Layered(multiple: true)"));
-    assert!(error(&image, ABOVE, |view| DVec3::splat(1.0 - fresnel_dielectric(-view.y, 1.4))) > 0.1);
+    assert!(error(&image, ABOVE, |view| DVec3::splat(1.0 - fresnel_dielectric(-view.y, 1.4))) > 0.15);
 }
 
 fn zip(a: &Image, b: &Image, f: fn(f32, f32) -> f32) -> Vec<[f32; 3]> {
