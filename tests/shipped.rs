@@ -6,8 +6,11 @@ use diaphane::scene::{MeshSource, Reader, Scene};
 use std::path::{Path, PathBuf};
 
 /// Scenes that warn, and why that is right.
-const WARN: [(&str, &str); 3] = [
+const WARN: [(&str, &str); 6] = [
     ("fish", "the measured media absorb light before it diffuses: that is what they are there for"),
+    ("one-lamp", "the same fish"),
+    ("four-lamps", "the same fish"),
+    ("sixteen-lamps", "the same fish"),
     ("layers", "light spreads less than a pixel in its leaf, whose layers are thinner still"),
     ("procession", "its figures are so far away that light spreads less than a pixel"),
 ];
