@@ -3,12 +3,15 @@
 mod studio;
 
 use diaphane::image::Image;
-use diaphane::optics::fresnel::fresnel_dielectric;
+use diaphane::optics::fresnel::{diffuse_transmittance, fresnel_dielectric, refracted_cosine};
+use diaphane::optics::half_space::HalfSpace;
 use diaphane::optics::phase::Phase;
+use diaphane::optics::strata;
 use diaphane::render::{self, Look};
 use diaphane::store::{Key, Plan};
 use glam::{DVec3, dvec3};
 use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::PI;
 use studio::{mean, most_apart, read, studio};
 
 /// One medium, 1/mm, with its phase function's own parameter.
@@ -175,14 +178,21 @@ fn the_papers_steps_get_there_slowly_and_steps_in_closed_form_at_once() {
 #[test]
 fn layers_that_are_none_change_nothing() {
     let mut studio = studio();
-    let ball = r#"mm_per_unit: 10, camera: (eye: (0, 1, 4), target: (0, 0, 0), fov_y_deg: 36),
-        lights: [Directional(direction: (-1, -2, -1), irradiance: 3), Environment(radiance: 0.5)],
-        objects: [(mesh: Sphere(radius: 1, subdivisions: 4), material: "thing.ron")],
-        view: (technique: Layered(), size: (32, 32), antialias: 1)"#;
-    let mut of = |layers: &[(Medium, f64)], below: Medium| {
-        studio.write("thing.ron", material(1.4, &constant(layers), below));
-        studio.scattered(ball)
-    };
+    for technique in ["Layered()", "Layered(multiple: true)"] {
+        let ball = format!(
+            r#"mm_per_unit: 10, camera: (eye: (0, 1, 4), target: (0, 0, 0), fov_y_deg: 36),
+            lights: [Directional(direction: (-1, -2, -1), irradiance: 3), Environment(radiance: 0.5)],
+            objects: [(mesh: Sphere(radius: 1, subdivisions: 4), material: "thing.ron")],
+            view: (technique: {technique}, size: (32, 32), antialias: 1)"#
+        );
+        what_changes_nothing(|layers, below| {
+            studio.write("thing.ron", material(1.4, &constant(layers), below));
+            studio.scattered(&ball)
+        });
+    }
+}
+
+fn what_changes_nothing(mut of: impl FnMut(&[(Medium, f64)], Medium) -> std::sync::Arc<Image>) {
     // One medium in any number of layers is that medium, but for where its steps end.
     let whole = of(&[], SKIN);
     let bright = mean(&whole);
@@ -290,6 +300,60 @@ fn the_surroundings_shine_in_as_an_integral_over_them_says() {
     }
 }
 
+/// The same medium, of which the channels are grey.
+fn grey(sigma_a: f64, sigma_s: f64) -> Medium {
+    let (sigma_a, sigma_s) = (DVec3::splat(sigma_a), DVec3::splat(sigma_s));
+    Medium { sigma_a, sigma_s, phase: Phase::HenyeyGreenstein, parameter: 0.0 }
+}
+
+#[test]
+fn what_scatters_often_under_a_lamp_is_what_a_half_space_sends_back_but_once() {
+    let mut studio = studio();
+    for (ior, below) in [(1.0, grey(0.2, 1.8)), (1.4, grey(0.05, 2.0)), (1.4, grey(1.0, 1.0))] {
+        // As one medium, and in layers of it.
+        for layers in [&[][..], &[(below, 0.3), (below, 0.9)]] {
+            studio.write("thing.ron", material(ior, &constant(layers), below));
+            let once = studio.scattered(&slab(ABOVE, SUN, "Layered()"));
+            let all = studio.scattered(&slab(ABOVE, SUN, "Layered(multiple: true)"));
+            let often = Image { pixels: zip(&all, &once, |a, b| a - b), ..(*all).clone() };
+            let [sigma_a, sigma_s] = [below.sigma_a.x, below.sigma_s.x];
+            let cos = to_sun().y;
+            let inside = refracted_cosine(cos, ior).expect("it enters");
+            let whole = HalfSpace::new(ior).albedos_from(sigma_a / (sigma_a + sigma_s), &[inside])[0];
+            let alone = sigma_s / (sigma_a + sigma_s) * strata::single(below.phase, 0.0, ior, ior, cos);
+            let entered = cos * (1.0 - fresnel_dielectric(cos, ior)) / (PI * diffuse_transmittance(ior));
+            let expected = |share: f64| {
+                move |view: DVec3| DVec3::splat((1.0 - fresnel_dielectric(-view.y, ior)) * entered * share)
+            };
+            let error_of = |share: f64| error(&often, ABOVE, expected(share));
+            let off = error_of(whole - alone);
+            assert!(off < 0.01, "index {ior}, {} layers: {off:.4}", layers.len());
+            assert!(error_of(whole) > 0.05 && error_of(1.05 * (whole - alone)) > 0.03);
+        }
+    }
+}
+
+#[test]
+fn white_layers_send_back_all_that_an_even_sky_sends() {
+    let mut studio = studio();
+    // What shines evenly from everywhere, and is not absorbed, is as bright from below: but for what the boundary reflects.
+    for (ior, layers) in [(1.0, &[][..]), (1.4, &[]), (1.4, &[(grey(0.0, 0.3), 0.5), (grey(0.0, 6.0), 1.0)])] {
+        studio.write("thing.ron", material(ior, &constant(layers), grey(0.0, 2.0)));
+        let image = studio.scattered(&slab(ABOVE, "Environment(radiance: 1)", "Layered(multiple: true)"));
+        let off = error(&image, ABOVE, |view| DVec3::splat(1.0 - fresnel_dielectric(-view.y, ior)));
+        // Of light that scattered often, all directions get the same.
+        assert!(off < 0.12, "index {ior}, {} layers: {off:.4}", layers.len());
+        assert!(image.pixels.iter().flatten().all(|value| *value < 1.02));
+    }
+    studio.write("thing.ron", material(1.4, &[], grey(0.02, 2.0)));
+    let image = studio.scattered(&slab(ABOVE, "Environment(radiance: 1)", "Layered(multiple: true)"));
+    assert!(error(&image, ABOVE, |view| DVec3::splat(1.0 - fresnel_dielectric(-view.y, 1.4))) > 0.15);
+}
+
+fn zip(a: &Image, b: &Image, f: fn(f32, f32) -> f32) -> Vec<[f32; 3]> {
+    a.pixels.iter().zip(&b.pixels).map(|(a, b)| std::array::from_fn(|c| f(a[c], b[c]))).collect()
+}
+
 fn anew(before: &Plan, after: &Plan) -> BTreeMap<&'static str, usize> {
     let known: BTreeSet<Key> = before.keys().collect();
     let mut names = BTreeMap::new();
@@ -335,6 +399,14 @@ fn an_edit_of_a_map_or_a_layer_bakes_nothing() {
             "{made:?}"
         );
     }
+    // What layers send back is one bake, which coefficients and depths do not touch, but phase functions do.
+    let often = slab(ABOVE, SUN, "Layered(multiple: true)");
+    let before = plan(&layers, &often);
+    assert!(before.steps().iter().any(|step| step.name == "layered.returns"));
+    let changed = anew(&before, &plan(&[(thicker, "0.2".into())], &often));
+    assert!(!changed.contains_key("layered.returns") && changed.contains_key("technique.layered"), "{changed:?}");
+    let turned = Medium { parameter: 0.3, ..SKIN };
+    assert!(anew(&before, &plan(&[(turned, map("R"))], &often)).contains_key("layered.returns"));
     // Without images nothing of a map is planned.
     let plain = plan(&constant(&[(SKIN, 0.4)]), &scene);
     assert!(plain.steps().iter().all(|step| !["layered.maps", "layered.slopes"].contains(&step.name)));

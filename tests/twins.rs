@@ -5,7 +5,7 @@ mod studio;
 
 use diaphane::gpu::{Bind, Buffer, Compute, Gpu, Shaders};
 use diaphane::image::{Display, Format, Tone};
-use diaphane::optics::{fresnel, microfacet, phase, sh};
+use diaphane::optics::{fresnel, microfacet, phase, sh, strata};
 use diaphane::render::{self, Look};
 use diaphane::store::{Key, Plan, Store};
 use std::collections::BTreeSet;
@@ -41,6 +41,11 @@ fn roughnesses() -> Vec<f64> {
 
 fn parameters() -> Vec<f64> {
     vec![-0.99, -0.6, -0.1, 0.0, 0.25, 0.4, 0.8, 0.99]
+}
+
+/// Of absorption and scattering, per length.
+fn coefficients() -> Vec<f64> {
+    vec![0.0, 1e-6, 0.02, 0.5, 3.0, 40.0]
 }
 
 fn directions() -> Vec<f64> {
@@ -131,6 +136,54 @@ fn twins() -> Vec<Twin> {
             tolerance: 2e-5,
             floor: 1e-3,
             mistake: ("(q * q)", "(q * sqrt(q))"),
+        },
+        Twin {
+            stem: "strata",
+            name: "admittance",
+            axes: vec![coefficients(), coefficients()],
+            rust: Box::new(|a| vec![strata::admittance(a[0], a[1])]),
+            results: 1,
+            tolerance: 1e-6,
+            floor: 1e-3,
+            mistake: ("sqrt(sigma_a / (sigma_a + sigma_s_prime))", "sqrt(sigma_a / (sigma_a + 2.0 * sigma_s_prime))"),
+        },
+        Twin {
+            stem: "strata",
+            name: "mean_exp",
+            axes: vec![coefficients(), coefficients()],
+            rust: Box::new(|a| vec![strata::mean_exp(a[0], a[1])]),
+            results: 1,
+            tolerance: 2e-5,
+            floor: 1e-3,
+            mistake: ("exp(-min(a, b))", "exp(-max(a, b))"),
+        },
+        Twin {
+            stem: "strata",
+            name: "below_all",
+            axes: vec![coefficients(), coefficients(), vec![1e-4, 0.3, 0.7, 1.0]],
+            rust: Box::new(|a| strata::below_all(a[0], a[1], a[2]).to_vec()),
+            results: 2,
+            tolerance: 1e-5,
+            floor: 1e-3,
+            mistake: ("1.7320508 * q * cos", "1.7320508 * q"),
+        },
+        Twin {
+            stem: "strata",
+            name: "on_top",
+            axes: vec![
+                coefficients(),
+                coefficients(),
+                vec![0.0, 1e-3, 0.3, 5.0],
+                vec![1e-4, 0.6, 1.0],
+                vec![1e-3, 0.3, 1.0],
+                vec![0.0, 0.4, 0.99],
+            ],
+            rust: Box::new(|a| strata::on_top(a[0], a[1], a[2], a[3], a[4], a[5]).to_vec()),
+            results: 2,
+            // Without absorption the two waves in a layer all but cancel.
+            tolerance: 5e-4,
+            floor: 0.01,
+            mistake: ("own - q", "q - own"),
         },
     ]
 }

@@ -75,16 +75,24 @@ impl HalfSpace {
 
     /// As the free function of this name, for a co-albedo 1 - alpha' in [0, 1].
     pub fn albedo_normal(&self, coalbedo: f64) -> f64 {
+        self.albedos_from(coalbedo, &[1.0])[0]
+    }
+
+    /// The share that leaves again of light that goes down inside, at each of these cosines in [0, 1].
+    pub fn albedos_from(&self, coalbedo: f64, cosines: &[f64]) -> Vec<f64> {
         let fates = self.fates(coalbedo);
         let h = HFunction::new(coalbedo);
-        let (h_normal, absorbed) = (h.at(1.0), coalbedo.sqrt() * h.at(1.0));
-        let mut fate = Fate { leaves: 0.0, absorbed };
-        for (node, (h, at)) in self.nodes.iter().zip(&fates) {
-            let k = kernel(coalbedo, node.mu, *h, 1.0, h_normal) * node.weight;
-            fate.leaves += k * (1.0 - node.reflectance + node.reflectance * at.leaves);
-            fate.absorbed += k * node.reflectance * at.absorbed;
-        }
-        fate.albedo()
+        let albedo = |&cos: &f64| {
+            let h_down = h.at(cos);
+            let mut fate = Fate { leaves: 0.0, absorbed: coalbedo.sqrt() * h_down };
+            for (node, (h, at)) in self.nodes.iter().zip(&fates) {
+                let k = kernel(coalbedo, node.mu, *h, cos, h_down) * node.weight;
+                fate.leaves += k * (1.0 - node.reflectance + node.reflectance * at.leaves);
+                fate.absorbed += k * node.reflectance * at.absorbed;
+            }
+            fate.albedo()
+        };
+        cosines.iter().map(albedo).collect()
     }
 
     /// As the free function of this name, for a co-albedo 1 - alpha' in [0, 1].

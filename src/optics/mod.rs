@@ -14,6 +14,7 @@
 //! | [`phase`] | where a scattered photon goes |
 //! | [`profile`] | how far from where it entered light leaves: dipoles, photon beams, normalised diffusion |
 //! | [`sh`] | real spherical harmonics and what convolution does to them |
+//! | [`strata`] | how much light layers over a half space send back |
 //! | [`slab`] | how much light comes out behind a slab |
 //! | [`quadrature`] | Gauss-Legendre rules, plain and graded towards a singular end, and a double exponential one |
 
@@ -28,6 +29,7 @@ pub mod quadrature;
 mod root;
 pub mod sh;
 pub mod slab;
+pub mod strata;
 
 /// One value per channel, linear Rec.709; arithmetic is channel by channel.
 pub type Rgb = glam::DVec3;
@@ -49,6 +51,7 @@ mod tests {
         for (source, functions) in [
             (include_str!("../../shaders/optics/fresnel.wgsl"), &["fresnel_dielectric"][..]),
             (include_str!("../../shaders/optics/microfacet.wgsl"), &["ggx_d", "smith_g2", "ggx_lobe"]),
+            (include_str!("../../shaders/optics/strata.wgsl"), &["admittance", "mean_exp", "below_all", "on_top"]),
             (include_str!("../../shaders/optics/sh.wgsl"), &["sh_basis_3", "sh_basis_8"]),
         ] {
             let module = validate(source).unwrap_or_else(|e| panic!("{e}"));

@@ -81,7 +81,8 @@ pub const REGISTRY: &[Entry] = &[
         "Layered(samples: 10, march: Uniform)",
         "Layered(samples: 50, march: Uniform)",
         "Layered(samples: 100, march: Uniform)",
-        "Layered(refract: false)"
+        "Layered(refract: false)",
+        "Layered(multiple: true)"
     ),
     entry!(
         long_range,

@@ -24,6 +24,9 @@ impl Column {
     }
 }
 
+/// Settings that make other light, and so have columns of their own.
+const OTHERWISE: [&str; 1] = ["Layered(multiple: true)"];
+
 /// Few paths, so that the grid is done in time: what is looked for is not noise.
 const SAMPLES: u32 = 8;
 const MAX_DEPTH: u32 = 64;
@@ -35,6 +38,12 @@ pub fn all() -> Vec<Column> {
         let text = TechniqueText::from_flag("--technique", &column.technique).expect("a name can be read");
         if Reference::of(&text).expect("it reads without settings").is_none() {
             columns.push(column);
+            let settings = OTHERWISE.iter().filter(|text| text.split('(').next() == Some(entry.name));
+            columns.extend(settings.map(|text| Column {
+                name: text.to_string(),
+                technique: text.to_string(),
+                is_traced: false,
+            }));
             continue;
         }
         for integrator in variants::<Integrator>() {

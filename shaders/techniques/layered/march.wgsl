@@ -7,9 +7,9 @@
 
 #include "frame/scene.wgsl"
 #include "frame/surface.wgsl"
-#include "frame/lights.wgsl"
 #include "optics/fresnel.wgsl"
 #include "optics/phase.wgsl"
+#include "techniques/layered/sources.wgsl"
 
 struct March {
     samples: u32,
@@ -40,26 +40,9 @@ struct Stratum {
     parameter: vec3f,
 }
 
-// A part of the sky.
-struct SkyLamp {
-    direction: vec3f,
-    // How far it reaches to either side, as a cosine.
-    spread: f32,
-    light: vec3f,
-}
-
 @group(0) @binding(0) var<uniform> camera: Camera;
 @group(0) @binding(1) var<storage, read> objects: array<Object>;
 @group(0) @binding(2) var packed_map: texture_2d<u32>;
-#if LIGHTS
-@group(0) @binding(3) var<storage, read> lights: array<Light>;
-#endif
-#if SHADOWS
-@group(0) @binding(4) var visibility: texture_2d_array<f32>;
-#endif
-#if SKY_LAMPS
-@group(0) @binding(5) var<storage, read> sky_lamps: array<SkyLamp>;
-#endif
 @group(0) @binding(6) var<uniform> march: March;
 @group(0) @binding(7) var<storage, read> stacks: array<Stack>;
 @group(0) @binding(8) var<storage, read> strata: array<Stratum>;
@@ -227,7 +210,7 @@ fn plane_above(ray: Ray, s: f32) -> vec4f {
 }
 
 // The mean of exp(-x) for x from a to b, in each channel.
-fn mean_exp(a: vec3f, b: vec3f) -> vec3f {
+fn mean_exps(a: vec3f, b: vec3f) -> vec3f {
     let x = abs(b - a);
     let series = 1.0 - x * (0.5 - x * (1.0 / 6.0 - x / 24.0));
     return exp(-min(a, b)) * select((1.0 - exp(-x)) / max(x, vec3f(1e-20)), series, x < vec3f(0.03));
@@ -240,21 +223,6 @@ fn phase(stratum: Stratum, cos: f32) -> vec3f {
     }
     return vec3f(henyey_greenstein(cos, k.r), henyey_greenstein(cos, k.g), henyey_greenstein(cos, k.b));
 }
-
-#if SKY_LAMPS
-// Where the light of a lamp comes from that lies above the horizon of a plane.
-fn above_horizon(lamp: SkyLamp, normal: vec3f) -> vec3f {
-    let cos = dot(lamp.direction, normal);
-    if abs(cos) >= lamp.spread {
-        return lamp.direction;
-    }
-    let middle = 0.5 * (cos + lamp.spread);
-    let sideways = lamp.direction - cos * normal;
-    return middle * normal + sqrt((1.0 - middle * middle) / max(1e-20, dot(sideways, sideways))) * sideways;
-}
-
-var<private> shares: array<vec4f, 4>;
-#endif
 
 // What lamps send along the ray from its part between `start` and `to`, which lies in one layer; the optical depths along
 // the ray are those of its ends.
@@ -269,43 +237,11 @@ fn scattered_between(ray: Ray, stratum: Stratum, start: f32, to: f32, near: vec3
     let plane = plane_above(ray, middle);
     let heights = vec2f(plane_above(ray, start).w, plane_above(ray, to).w);
     let above = ray.origin + middle * ray.direction + plane.w * plane.xyz;
-    var lamps = 0u;
-#if LIGHTS
-    lamps = arrayLength(&lights);
-#endif
-    var count = lamps;
-#if SKY_LAMPS
-    count += arrayLength(&sky_lamps);
-#endif
     var sum = vec3f(0.0);
-    for (var l = 0u; l < count; l++) {
-        var samples = 1;
-        var seen = 1.0;
-#if LIGHTS
-        if l < lamps {
-            samples = light_samples(lights[l]);
-#if SHADOWS
-            if lights[l].visibility >= 0 {
-                seen = textureLoad(visibility, pixel, lights[l].visibility, 0).r;
-            }
-#endif
-        }
-#endif
-        if seen <= 0.0 {
-            continue;
-        }
-        for (var i = 0; i < samples; i++) {
-            var light_in: Incident;
-#if LIGHTS
-            if l < lamps { light_in = incident(lights[l], i, above); }
-#endif
-#if SKY_LAMPS
-            if l >= lamps {
-                let lamp = sky_lamps[l - lamps];
-                let share = shares[(l - lamps) >> 2u][(l - lamps) & 3u];
-                light_in = Incident(above_horizon(lamp, plane.xyz), share * lamp.light, 1.0, 0.0);
-            }
-#endif
+    for (var l = 0u; l < sources(); l++) {
+        let shining = source(l, pixel);
+        for (var i = 0; i < shining.samples; i++) {
+            let light_in = arriving(l, i, above, plane.xyz);
             // Behind its plane a point is unlit.
             let cos_in = dot(plane.xyz, light_in.direction);
             if cos_in <= 0.0 || all(light_in.irradiance <= vec3f(0.0)) {
@@ -323,14 +259,18 @@ fn scattered_between(ray: Ray, stratum: Stratum, start: f32, to: f32, near: vec3
 #if UNIFORM
             let through = exp(-first);
 #else
-            let through = mean_exp(first, far + down[1] / cos_below);
+            let through = mean_exps(first, far + down[1] / cos_below);
 #endif
             let turned = phase(stratum, clamp(-dot(to_light, ray.direction), -1.0, 1.0));
-            sum += seen * enters * light_in.irradiance * turned * through;
+            sum += shining.seen * enters * light_in.irradiance * turned * through;
         }
     }
     return (to - start) * stratum.sigma_s * sum;
 }
+
+#if MULTIPLE
+#include "techniques/layered/multiple.wgsl"
+#endif
 
 @fragment
 fn fragment(in: Vertex) -> @location(0) vec4f {
@@ -414,5 +354,8 @@ fn fragment(in: Vertex) -> @location(0) vec4f {
         }
         start = to;
     }
+#if MULTIPLE
+    radiance += ray.stack.bend * ray.stack.bend * scattered_often(ray, bodies[in.object], pixel);
+#endif
     return vec4f(leaves * radiance, 1.0);
 }
