@@ -318,17 +318,23 @@ fn what_scatters_often_under_a_lamp_is_what_a_half_space_sends_back_but_once() {
             let often = Image { pixels: zip(&all, &once, |a, b| a - b), ..(*all).clone() };
             let [sigma_a, sigma_s] = [below.sigma_a.x, below.sigma_s.x];
             let cos = to_sun().y;
-            let inside = refracted_cosine(cos, ior).expect("it enters");
-            let whole = HalfSpace::new(ior).albedos_from(sigma_a / (sigma_a + sigma_s), &[inside])[0];
-            let alone = sigma_s / (sigma_a + sigma_s) * strata::single(below.phase, 0.0, ior, ior, cos);
-            let entered = cos * (1.0 - fresnel_dielectric(cos, ior)) / (PI * diffuse_transmittance(ior));
-            let expected = |share: f64| {
-                move |view: DVec3| DVec3::splat((1.0 - fresnel_dielectric(-view.y, ior)) * entered * share)
+            let returned = |cos: f64| {
+                let inside = refracted_cosine(cos, ior).expect("it enters");
+                let whole = HalfSpace::new(ior).albedos_from(sigma_a / (sigma_a + sigma_s), &[inside])[0];
+                whole - sigma_s / (sigma_a + sigma_s) * strata::single(below.phase, 0.0, ior, ior, cos)
             };
-            let error_of = |share: f64| error(&often, ABOVE, expected(share));
-            let off = error_of(whole - alone);
-            assert!(off < 0.01, "index {ior}, {} layers: {off:.4}", layers.len());
-            assert!(error_of(whole) > 0.05 && error_of(1.05 * (whole - alone)) > 0.03);
+            // Over light from everywhere: it leaves in a direction as it would be returned from there.
+            let nodes: Vec<f64> = (0..24).map(|i| ((f64::from(i) + 0.5) / 24.0).sqrt()).collect();
+            let enters = |cos: f64| 1.0 - fresnel_dielectric(cos, ior);
+            let whole: f64 = nodes.iter().map(|cos| enters(*cos)).sum();
+            let mean = nodes.iter().map(|cos| enters(*cos) * returned(*cos)).sum::<f64>() / whole;
+            let entered = cos * enters(cos) / (PI * diffuse_transmittance(ior)) * returned(cos) / mean;
+            let expected =
+                |times: f64| move |view: DVec3| DVec3::splat(times * enters(-view.y) * entered * returned(-view.y));
+            let error_of = |times: f64| error(&often, ABOVE, expected(times));
+            let off = error_of(1.0);
+            assert!(off < 0.02, "index {ior}, {} layers: {off:.4}", layers.len());
+            assert!(error_of(1.05) > 0.03 && error_of(0.95) > 0.03);
         }
     }
 }
@@ -341,7 +347,6 @@ fn white_layers_send_back_all_that_an_even_sky_sends() {
         studio.write("thing.ron", material(ior, &constant(layers), grey(0.0, 2.0)));
         let image = studio.scattered(&slab(ABOVE, "Environment(radiance: 1)", "Layered(multiple: true)"));
         let off = error(&image, ABOVE, |view| DVec3::splat(1.0 - fresnel_dielectric(-view.y, ior)));
-        // Of light that scattered often, all directions get the same.
         assert!(off < 0.12, "index {ior}, {} layers: {off:.4}", layers.len());
         assert!(image.pixels.iter().flatten().all(|value| *value < 1.02));
     }

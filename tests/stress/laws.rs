@@ -11,10 +11,9 @@ const WHITE: f64 = 1.02;
 /// The same of techniques that add up pieces of surface, whose brightest pixel may get most of its light from one piece
 /// that is seen at a slant, or in part.
 const WHITE_IN_PIECES: [(&str, f64); 3] =
-    [("ScreenSpace", 1.05), ("LongRange", 1.15), ("Layered(multiple", SPREAD_EVENLY)];
-/// And of one that lets all that scattered often leave evenly, though less of it leaves at a slant, where more leaves that
-/// scattered once. Over all directions it is no more than there is.
-const SPREAD_EVENLY: f64 = 1.06;
+    [("ScreenSpace", 1.05), ("LongRange", 1.15), ("Layered(multiple", SIXTEEN_LAMPS)];
+/// And of one that takes the sky for sixteen lamps, which know its irradiance less well.
+const SIXTEEN_LAMPS: f64 = 1.06;
 /// Two pictures whose every operation differs by powers of two only, of the brightest number in them: nothing is rounded
 /// otherwise, but for what a library's functions do.
 const EXACTLY: f64 = 1e-5;

@@ -105,7 +105,22 @@ fn widened(ray: Ray) -> Ray {
     return wide;
 }
 
-// Radiance, but for Fresnel on the way out.
+// The mean of that over light that comes from everywhere, in three directions.
+fn returned_in_the_mean(ray: Ray, body: Body) -> vec3f {
+    let cosines = vec3f(0.33571, 0.70711, 0.94196);
+    let shares = vec3f(5.0, 8.0, 5.0);
+    var sum = vec3f(0.0);
+    var entered = 0.0;
+    for (var i = 0; i < 3; i++) {
+        let enters = shares[i] * (1.0 - fresnel_dielectric(cosines[i], ray.eta));
+        sum += enters * returned_often(ray, body, cosines[i]);
+        entered += enters;
+    }
+    return sum / entered;
+}
+
+// Radiance, but for Fresnel on the way out. Light leaves in a direction as it would be returned from there: both ways are
+// alike, and what is evenly lit and white is evenly bright.
 fn scattered_often(ray: Ray, body: Body, pixel: vec2i) -> vec3f {
     let wide = widened(ray);
     var sum = vec3f(0.0);
@@ -120,5 +135,6 @@ fn scattered_often(ray: Ray, body: Body, pixel: vec2i) -> vec3f {
             }
         }
     }
-    return body.spread * sum;
+    let leaves = returned_often(wide, body, saturate(-dot(ray.normal, normalize(ray.origin))));
+    return body.spread * sum * leaves / max(vec3f(1e-20), returned_in_the_mean(wide, body));
 }
