@@ -178,9 +178,10 @@ mod tests {
                 let ours = albedo(layers, ior, cos);
                 println!("index {ior} cosine {cos}: {truth:.4} walked, {ours:.4} diffused");
                 assert!((ours / truth - 1.0).abs() < 0.12, "index {ior}, cosine {cos}, {layers:?}: {ours} {truth}");
-                // Teeth: the same without its first layer.
+                // Teeth: the same without its first layer, where that is not thin.
+                let is_thin = (layers[0].0 + layers[0].1) * layers[0].2 < 0.2;
                 let bare: Vec<Layer> = layers[1..].iter().map(|l| (l.0, l.1, l.2 - layers[0].2)).collect();
-                assert!(layers[0].0 < 0.1 || (albedo(&bare, ior, cos) / ours - 1.0).abs() > 0.015);
+                assert!(is_thin || (albedo(&bare, ior, cos) / ours - 1.0).abs() > 0.015);
             }
         }
     }
@@ -214,10 +215,8 @@ mod tests {
                 for d in [0.0, 1e-9, 1.0, 1e6] {
                     for (q, returned) in [(0.001, 0.99), (0.3, 0.4), (1.0, 0.0)] {
                         let [q, returned] = on_top(a, s, d, 0.4, q, returned);
-                        assert!(
-                            (0.0..=1.0).contains(&q) && (0.0..=1.0).contains(&returned),
-                            "{a} {s} {d}: {q} {returned}"
-                        );
+                        let rounded = 0.0..=1.0 + 1e-12;
+                        assert!(rounded.contains(&q) && rounded.contains(&returned), "{a} {s} {d}: {q} {returned}");
                     }
                 }
             }

@@ -1,7 +1,10 @@
 // Light that scatters more than once below a place and leaves there: what the layers send back by diffusion, less what
 // `single` says that they send back after one event. Both take the layers for as deep everywhere as they are there.
 
+#include "optics/fresnel.wgsl"
 #include "optics/strata.wgsl"
+#include "techniques/layered/ray.wgsl"
+#include "techniques/layered/sources.wgsl"
 
 struct Reduced {
     sigma_a: vec3f,
