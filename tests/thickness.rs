@@ -17,10 +17,15 @@ fn wax() -> Medium {
 
 /// What a technique scatters of a lamp of irradiance 1 that shines along `direction`; 10 mm a unit.
 fn scattered(studio: &mut Studio, technique: &str, objects: &str, direction: &str) -> Image {
+    under(studio, technique, objects, &format!("Directional(name: \"lamp\", direction: {direction}, irradiance: 1)"))
+}
+
+/// Likewise of other lights.
+fn under(studio: &mut Studio, technique: &str, objects: &str, lights: &str) -> Image {
     studio.write("wax.ron", WAX);
     let image = studio.scattered(&format!(
         "mm_per_unit: 10.0, camera: (eye: (0, 0, 40), target: (0, 0, 0), fov_y_deg: 4),
-         lights: [Directional(name: \"lamp\", direction: {direction}, irradiance: 1)],
+         lights: [{lights}],
          objects: [{objects}], view: (technique: {technique}, size: (48, 48), antialias: 1)"
     ));
     image.as_ref().clone()
@@ -109,6 +114,52 @@ fn moving_a_thing_with_its_lamp_and_eye_changes_nothing() {
         println!("{technique}: {:.4} of the light is elsewhere", apart / light);
         assert!(light > 0.0 && apart < 0.03 * light, "{technique}: {}", apart / light);
     }
+}
+
+/// The inner product of two series is what many lamps add up to, one by one.
+#[test]
+fn an_even_sky_is_as_many_lamps_as_one_likes() {
+    let mut studio = studio();
+    let ball = "(name: \"ball\", mesh: Sphere(radius: 1.2, subdivisions: 4), material: \"wax.ron\"),";
+    let technique = "SphericalThickness(bands: 5, front_bands: 5)";
+    const LAMPS: usize = 128;
+    let lamp = |i: usize| {
+        let z = 1.0 - (2 * i + 1) as f64 / LAMPS as f64;
+        let (y, x) = (i as f64 * std::f64::consts::PI * (3.0 - 5f64.sqrt())).sin_cos();
+        let across = (1.0 - z * z).sqrt();
+        let irradiance = 4.0 * std::f64::consts::PI / LAMPS as f64;
+        format!(
+            "Directional(direction: ({}, {}, {z}), irradiance: {irradiance}, shadow: false),",
+            across * x,
+            across * y
+        )
+    };
+    let lamps: String = (0..LAMPS).map(lamp).collect();
+    let sky = |radiance: f64| format!("Environment(radiance: {radiance}, shadow: false)");
+    let added = under(&mut studio, technique, ball, &lamps);
+    let mut apart =
+        |radiance| (middle(&under(&mut studio, technique, ball, &sky(radiance))) / middle(&added) - 1.0).abs();
+    let off = apart(1.0);
+    println!("{off:.4} off");
+    assert!(off.max_element() < 0.02, "{off}");
+    assert!(apart(1.05).min_element() > 0.02, "five in a hundred are noticed");
+}
+
+/// Few bands of a step ring: behind an edge they fall below what is there. A window damps that.
+#[test]
+fn a_window_leaves_less_contrast_the_stronger_it_is() {
+    let mut studio = studio();
+    let knot = "(name: \"knot\", mesh: TorusKnot(p: 2, q: 3, radius: 0.7, tube: 0.3, segments: (60, 12)), material: \"wax.ron\"),";
+    let mut contrast = |window: f64| {
+        let technique = format!("SphericalThickness(bands: 6, front_bands: 6, diffuse: 0, window: {window})");
+        let image = scattered(&mut studio, &technique, knot, "(0.2, 0.1, 1)");
+        let seen: Vec<f64> = image.pixels.iter().map(|p| f64::from(p[0])).filter(|v| *v > 0.0).collect();
+        let mean = seen.iter().sum::<f64>() / seen.len() as f64;
+        (seen.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / seen.len() as f64).sqrt() / mean
+    };
+    let [none, some, much] = [0.0, 1.0, 4.0].map(&mut contrast);
+    println!("{none:.3} {some:.3} {much:.3}");
+    assert!(none > 1.02 * some && some > 1.02 * much, "{none} {some} {much}");
 }
 
 /// Two walls with a gap between them, as one mesh: a depth map holds the first entry only, and counts the gap as filled.

@@ -52,10 +52,11 @@ fn everything_is_written_and_nothing_is_measured_twice() {
     // Again, by the name of the file beside it: nothing is new.
     let again = desk.run(&["bench", "scene.bench.ron", "scene.ron", "-o", "out", "--json"]).ok().json();
     assert_eq!((again["new_rows"].as_u64(), text(&desk, "out/samples.csv")), (Some(0), csv.clone()));
-    // One more of each frame, and no more than that.
+    // One more of each frame and edit, and no more than that.
     let more = run(&["--repetitions", "2"]);
-    let passes = rows.iter().filter(|row| row.contains(",frame,") || row.contains(",pass:")).count();
-    assert_eq!(more["new_rows"].as_u64(), Some(passes as u64));
+    let is_drawn = |row: &&&str| [",frame,", ",pass:", ",edit:"].iter().any(|measure| row.contains(measure));
+    let drawn = rows.iter().filter(is_drawn).count();
+    assert_eq!(more["new_rows"].as_u64(), Some(drawn as u64));
     // What an interruption cuts off is measured again.
     let all = text(&desk, "out/samples.csv");
     let cut: Vec<&str> = all.lines().filter(|row| !row.contains("FilteredNormals,,24x16,bake")).collect();

@@ -101,7 +101,9 @@ fn groups(mesh: &Mesh, wanted: u32) -> (Vec<u32>, u32) {
     let on_grid: Vec<Vec3> = mesh.positions.iter().map(|p| ((p.as_dvec3() - low) * steps).round().as_vec3()).collect();
     let positions: Vec<[f32; 3]> = on_grid.iter().map(|p| p.to_array()).collect();
     let options = SimplifyOptions::Regularize | SimplifyOptions::Prune;
-    let coarse = meshopt::simplify_decoder(&indices, &positions, 3 * wanted as usize, 1.0, options, None);
+    // Of what has fewer triangles than are wanted all stay.
+    let target = indices.len().min(3 * wanted as usize);
+    let coarse = meshopt::simplify_decoder(&indices, &positions, target, 1.0, options, None);
     let triangles: Vec<[u32; 3]> = coarse.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
     let coarse = Mesh { positions: on_grid.clone(), triangles, ..Mesh::default() };
     let nearest = Nearest::new(&coarse);
