@@ -207,8 +207,6 @@ fn fragment(in: Vertex) -> @location(0) vec4f {
     ray.direction = select(-to_eye, along - sqrt(max(0.0, 1.0 - dot(along, along))) * ray.normal, ray.stack.bend > 1.0);
     ray.fall = max(GRAZING, -dot(ray.plane.xyz, ray.direction));
 
-    // Of what lies deeper, less than a thousandth gets out.
-    const DARK = 6.9;
 #if UNIFORM
     // The paper's depth is one for all angles [eq. 15].
     let deepest = depth_of(ray, DARK, true);

@@ -29,18 +29,28 @@ struct Body {
 // that cosine, what comes back after one event without absorption.
 @group(0) @binding(13) var<storage, read> returns: array<vec4f>;
 
+fn correction(body: Body, q: f32, cos: f32) -> f32 {
+    let at = saturate(vec2f(q, cos)) * f32(body.knots - 1u);
+    let low = min(vec2u(at), vec2u(body.knots - 2u));
+    let share = at - vec2f(low);
+    let i = body.returns + low.x * body.knots + low.y;
+    let clearer = mix(returns[i].r, returns[i + 1u].r, share.y);
+    let darker = mix(returns[i + body.knots].r, returns[i + body.knots + 1u].r, share.y);
+    return mix(clearer, darker, share.x);
+}
+
 fn corrections(body: Body, q: vec3f, cos: f32) -> vec3f {
-    var values = vec3f(0.0);
-    for (var c = 0; c < 3; c++) {
-        let at = saturate(vec2f(q[c], cos)) * f32(body.knots - 1u);
-        let low = min(vec2u(at), vec2u(body.knots - 2u));
-        let share = at - vec2f(low);
-        let i = body.returns + low.x * body.knots + low.y;
-        let clearer = mix(returns[i].r, returns[i + 1u].r, share.y);
-        let darker = mix(returns[i + body.knots].r, returns[i + body.knots + 1u].r, share.y);
-        values[c] = mix(clearer, darker, share.x);
-    }
-    return values;
+    return vec3f(correction(body, q.r, cos), correction(body, q.g, cos), correction(body, q.b, cos));
+}
+
+// The admittance of all from a layer on downwards, and what diffuses up from there, in each channel.
+struct Level {
+    q: vec3f,
+    diffused: vec3f,
+}
+
+fn level(r: array<f32, 2>, g: array<f32, 2>, b: array<f32, 2>) -> Level {
+    return Level(vec3f(r[0], g[0], b[0]), vec3f(r[1], g[1], b[1]));
 }
 
 // What one stratum alone sends back after one event.
@@ -63,14 +73,10 @@ fn returned_often(ray: Ray, body: Body, cos: f32) -> vec3f {
     // Light that scatters once goes in and, at the mean cosine of diffuse light, out again.
     let slant = 1.0 / below_surface(cos, ray.stack.bend) + 1.0 / below_surface(2.0 / 3.0, ray.stack.bend);
     let count = ray.stack.last - ray.stack.first;
-    var q: vec3f;
-    var diffused: vec3f;
     let deepest = reduced[ray.stack.last];
-    for (var c = 0; c < 3; c++) {
-        let level = below_all(deepest.sigma_a[c], deepest.sigma_s_prime[c], down);
-        q[c] = level[0];
-        diffused[c] = level[1];
-    }
+    let a = deepest.sigma_a;
+    let s = deepest.sigma_s_prime;
+    var up = level(below_all(a.r, s.r, down), below_all(a.g, s.g, down), below_all(a.b, s.b, down));
     var once = single(ray, body, count, cos);
     // From the deepest layer upwards.
     var ends = vec4f(0.0);
@@ -85,59 +91,76 @@ fn returned_often(ray: Ray, body: Body, cos: f32) -> vec3f {
         }
         let thickness = max(0.0, ends[j & 3u] - top);
         let layer = reduced[ray.stack.first + j];
-        for (var c = 0; c < 3; c++) {
-            let level = on_top(layer.sigma_a[c], layer.sigma_s_prime[c], thickness, down, q[c], diffused[c]);
-            q[c] = level[0];
-            diffused[c] = level[1];
-        }
+        let a = layer.sigma_a;
+        let s = layer.sigma_s_prime;
+        up = level(
+            on_top(a.r, s.r, thickness, down, up.q.r, up.diffused.r),
+            on_top(a.g, s.g, thickness, down, up.q.g, up.diffused.g),
+            on_top(a.b, s.b, thickness, down, up.q.b, up.diffused.b)
+        );
         let below = exp(-slant * thickness * strata[ray.stack.first + j].sigma_t);
         once = mix(single(ray, body, j, cos), once, below);
     }
-    let all = corrections(body, q, cos) * diffused / (1.0 + body.boundary * q);
+    let all = corrections(body, up.q, cos) * up.diffused / (1.0 + body.boundary * up.q);
     return max(vec3f(0.0), all - once);
 }
 
-// How far light gets to the side before it scatters: so wide a piece of the map is one.
+// How far light gets to the side before it scatters, in the mean along the ray: so wide a piece of the map is one.
 fn widened(ray: Ray) -> Ray {
     var wide = ray;
 #if DEPTHS
     let texels = vec2f(textureDimensions(depth_maps));
     let per_length = max(length(ray.slope_u) * texels.x, length(ray.slope_v) * texels.y);
-    wide.level = max(ray.level, log2(max(1.0, 2.0 * per_length * depth_of(ray, 1.0, false))));
+    wide.level = max(ray.level, log2(max(1.0, 2.0 * per_length * ray.end / DARK)));
 #endif
     return wide;
 }
 
-// The mean of that over light that comes from everywhere, in three directions.
-fn returned_in_the_mean(ray: Ray, body: Body) -> vec3f {
+// Radiance, but for Fresnel on the way out. Light leaves in a direction as it would be returned from there, as a share of
+// the mean over all that comes from everywhere: both ways are alike, and what is evenly lit and white is evenly bright.
+fn scattered_often(ray: Ray, body: Body, pixel: vec2i) -> vec3f {
+    // Three directions stand for light from everywhere.
     let cosines = vec3f(0.33571, 0.70711, 0.94196);
     let shares = vec3f(5.0, 8.0, 5.0);
-    var sum = vec3f(0.0);
-    var entered = 0.0;
-    for (var i = 0; i < 3; i++) {
-        let enters = shares[i] * (1.0 - fresnel_dielectric(cosines[i], ray.eta));
-        sum += enters * returned_often(ray, body, cosines[i]);
-        entered += enters;
-    }
-    return sum / entered;
-}
-
-// Radiance, but for Fresnel on the way out. Light leaves in a direction as it would be returned from there: both ways are
-// alike, and what is evenly lit and white is evenly bright.
-fn scattered_often(ray: Ray, body: Body, pixel: vec2i) -> vec3f {
     let wide = widened(ray);
-    var sum = vec3f(0.0);
-    for (var l = 0u; l < sources(); l++) {
-        let shining = source(l, pixel);
-        for (var i = 0; i < shining.samples; i++) {
-            let light_in = arriving(l, i, ray.origin, ray.normal);
-            let cos = min(1.0, dot(ray.normal, light_in.direction));
-            if cos > 0.0 && any(light_in.irradiance > vec3f(0.0)) {
-                let enters = shining.seen * cos * (1.0 - fresnel_dielectric(cos, ray.eta));
-                sum += enters * light_in.irradiance * returned_often(wide, body, cos);
+    var leaves = vec3f(0.0);
+    var everywhere = vec3f(0.0);
+    var entered = 0.0;
+    var shone = vec3f(0.0);
+    // One loop over all directions, since drivers inline what each of them takes: first the one that light leaves in, then
+    // those three, then where lamps are.
+    var l = 0u;
+    var sample = 0;
+    for (var k = 0; k < 4 || l < sources(); k++) {
+        var cos = saturate(-dot(ray.normal, normalize(ray.origin)));
+        var light = vec3f(0.0);
+        if k >= 4 {
+            let shining = source(l, pixel);
+            if sample >= shining.samples {
+                l++;
+                sample = 0;
+                continue;
             }
+            let light_in = arriving(l, sample, ray.origin, ray.normal);
+            sample++;
+            cos = min(1.0, dot(ray.normal, light_in.direction));
+            light = shining.seen * cos * light_in.irradiance;
+            if cos <= 0.0 || all(light <= vec3f(0.0)) {
+                continue;
+            }
+        } else if k >= 1 {
+            cos = cosines[k - 1];
+        }
+        let returned = returned_often(wide, body, cos);
+        let enters = 1.0 - fresnel_dielectric(cos, ray.eta);
+        if k == 0 {
+            leaves = returned;
+        } else if k < 4 {
+            everywhere += shares[k - 1] * enters * returned;
+            entered += shares[k - 1] * enters;
+        } else {
+            shone += enters * light * returned;
         }
     }
-    let leaves = returned_often(wide, body, saturate(-dot(ray.normal, normalize(ray.origin))));
-    return body.spread * sum * leaves / max(vec3f(1e-20), returned_in_the_mean(wide, body));
+    return body.spread * shone * leaves / max(vec3f(1e-20), everywhere / entered);
 }

@@ -34,6 +34,9 @@ struct Stratum {
 // Cosines below this count as this: what is seen so edge-on differs by less than the bound itself.
 const GRAZING: f32 = 1e-4;
 
+// Of what lies below this optical depth, less than a thousandth gets out.
+const DARK: f32 = 6.9;
+
 // A pixel's ray, from where it enters on. Places are relative to that, but for `origin`.
 struct Ray {
     stack: Stack,
