@@ -64,13 +64,15 @@ fn cut(mesh: &Mesh, wanted: u32) -> Patches {
         return Patches { leaves: Vec::new(), starts: vec![0] };
     }
     let (of_vertex, group_count) = groups(mesh, wanted);
-    // Twice as long as the side of a square patch.
-    let longest = 2.0 * (area / wanted as f64).sqrt();
+    // Twice as long as the side of a square patch; and what is a sixteenth of it has no light to speak of, however long it
+    // is, so that a needle is no million of pieces.
+    let patch = area / wanted as f64;
+    let (longest, least) = (2.0 * patch.sqrt(), patch / 16.0);
     let mut whole: Vec<Vec<Leaf>> = vec![Vec::new(); group_count as usize];
     let mut pieces: Vec<Leaf> = Vec::new();
     for (t, triangle) in mesh.triangles.iter().enumerate() {
         let mut leaves = Vec::new();
-        halve(mesh.corners(t), [Vec2::ZERO, Vec2::X, Vec2::Y], 1.0, longest, &mut |at, share| {
+        halve(mesh.corners(t), [Vec2::ZERO, Vec2::X, Vec2::Y], 1.0, (longest, least), &mut |at, share| {
             leaves.push(Leaf { triangle: t as u32, at, share })
         });
         match leaves.len() {
@@ -127,19 +129,25 @@ fn groups(mesh: &Mesh, wanted: u32) -> (Vec<u32>, u32) {
     (of_vertex, numbers.len() as u32)
 }
 
-/// Tells middle and share of the pieces of a triangle, none of whose sides is longer than `longest`.
-fn halve(corners: [DVec3; 3], at: [Vec2; 3], share: f32, longest: f64, each: &mut impl FnMut(Vec2, f32)) {
+/// Tells middle and share of the pieces of a triangle, none of whose sides is longer than the longest, but for pieces of
+/// less than the least area.
+fn halve(
+    corners: [DVec3; 3],
+    at: [Vec2; 3],
+    share: f32,
+    (longest, least): (f64, f64),
+    each: &mut impl FnMut(Vec2, f32),
+) {
     let side = |i: usize| corners[i].distance(corners[(i + 1) % 3]);
     let i = (0..3).fold(0, |best, i| if side(i) > side(best) { i } else { best });
-    // A sliver has no area to speak of, however long it is.
-    let area = (corners[1] - corners[0]).cross(corners[2] - corners[0]).length();
-    if side(i) <= longest || share < 1e-4 || area < 1e-3 * longest * longest {
+    let area = 0.5 * (corners[1] - corners[0]).cross(corners[2] - corners[0]).length();
+    if side(i) <= longest || share < 1e-4 || area < least {
         return each((at[0] + at[1] + at[2]) / 3.0, share);
     }
     let (j, k) = ((i + 1) % 3, (i + 2) % 3);
     let (middle, middle_at) = (0.5 * (corners[i] + corners[j]), 0.5 * (at[i] + at[j]));
-    halve([corners[i], middle, corners[k]], [at[i], middle_at, at[k]], 0.5 * share, longest, each);
-    halve([middle, corners[j], corners[k]], [middle_at, at[j], at[k]], 0.5 * share, longest, each);
+    halve([corners[i], middle, corners[k]], [at[i], middle_at, at[k]], 0.5 * share, (longest, least), each);
+    halve([middle, corners[j], corners[k]], [middle_at, at[j], at[k]], 0.5 * share, (longest, least), each);
 }
 
 /// Where the leaves are on the mesh as it is now, with its normals.
@@ -250,6 +258,9 @@ mod tests {
             }
             assert_eq!(cut(&mesh, 500), patches);
         }
+        let mut needle = shapes::sphere(1.0, 3);
+        needle.positions.iter_mut().for_each(|p| *p *= Vec3::new(1e-6, 1.0, 1e-6));
+        assert!((500..20_000).contains(&cut(&needle, 500).leaves.len()), "{}", cut(&needle, 500).leaves.len());
         assert_eq!(cut(&Mesh::default(), 100), Patches { leaves: Vec::new(), starts: vec![0] });
     }
 }
