@@ -8,12 +8,9 @@ use diaphane::scene::Part;
 /// Light that comes back from white surroundings, as a share of theirs. The sky is 256 directions for what is drawn, and
 /// they know its irradiance on a plane to a hundredth.
 const WHITE: f64 = 1.02;
-/// The same of techniques that add up pieces of surface, whose brightest pixel may get most of its light from one piece
-/// that is seen at a slant, or in part.
-const WHITE_IN_PIECES: [(&str, f64); 3] =
-    [("ScreenSpace", 1.05), ("LongRange", 1.15), ("Layered(multiple", SIXTEEN_LAMPS)];
-/// And of one that takes the sky for sixteen lamps, which know its irradiance less well.
-const SIXTEEN_LAMPS: f64 = 1.06;
+/// The same of techniques that know the light less well: two add up pieces of surface, and their brightest pixel may get most
+/// of its light from one piece that is seen at a slant, or in part; one takes the sky for sixteen lamps.
+const WHITE_IN_PIECES: [(&str, f64); 3] = [("ScreenSpace", 1.05), ("LongRange", 1.15), ("Layered(multiple", 1.06)];
 /// Two pictures whose every operation differs by powers of two only, of the brightest number in them: nothing is rounded
 /// otherwise, but for what a library's functions do.
 const EXACTLY: f64 = 1e-5;

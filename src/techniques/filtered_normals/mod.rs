@@ -16,9 +16,8 @@
 //! How frequencies are told apart is the setting `engine`:
 //!
 //! - `Krylov` makes a small basis for this one field of normals. Smooth kernels come out to a thousandth or better, over the
-//!   whole spectrum, on slivers too. The bake solves some fifty sparse systems with three or four
-//!   factors, 0.7 s for 35,000 vertices; it is made for a step of widths, a factor of 4, so that an edit within it finds it
-//!   there.
+//!   whole spectrum, on slivers too. The bake solves some fifty sparse systems with three or four factors, 0.7 s for 35,000
+//!   vertices; it is made for a step of widths, a factor of 4, so that an edit within it finds it there.
 //! - `Harmonics` finds the eigenpairs of the mesh up to the paper's omega_m (a wavelength of ten edges) or to where the
 //!   kernel has ended; what lies above is weighted as a whole [Patro2007, eq. 11]. The bake is a hundred times longer.
 //! - `Auto` takes eigenpairs for a Box, a Normalized, and a curve as steep as a box, and Krylov for all else.
