@@ -15,6 +15,10 @@ pub const PAPERS: &[Paper] = &[
         "Andersson2020",
         "P. Andersson et al. FLIP: A Difference Evaluator for Alternating Images. Proc. ACM CGIT 3(2), 2020",
     ),
+    paper(
+        "Bekaert2002",
+        "P. Bekaert, M. Sbert & J. Halton. Accelerating Path Tracing by Re-Using Paths. Eurographics Workshop on Rendering 2002",
+    ),
     paper("Botsch2004", "M. Botsch & L. Kobbelt. A Remeshing Approach to Multiresolution Modeling. SGP 2004"),
     paper("Chandrasekhar1960", "S. Chandrasekhar. Radiative Transfer. Dover, 1960"),
     paper(

@@ -57,7 +57,7 @@ pub fn settings(truth: Truth, scene: &Scene, view: &crate::frame::View) -> Setti
         time_s: view.time_s,
         max_depth: scene.reference.max_depth,
         seed: scene.reference.seed,
-        rows: (0, 1),
+        bands: (0, 1),
     }
 }
 

@@ -162,7 +162,7 @@ impl Trace {
             time_s: look.view.time_s,
             max_depth: own.max_depth,
             seed: self.seed.unwrap_or(own.seed),
-            rows: (first, step),
+            bands: (first, step),
         };
         let max_samples = own.max_spp.max(1) as u64;
         let goal = match (self.spp, self.seconds) {

@@ -5,8 +5,8 @@
 //!
 //! x_i is sought by a line along the normal at x_o or along one of two tangents, at a radius drawn from one channel's
 //! profile [King2013]. Each place where the line meets the thing has a density, that of all axes and channels together
-//! (the balance heuristic). Of these places one is drawn in proportion to R_d over its density, where [Pharr2016, 15.4.2]
-//! draws evenly. More differs from there: neither radii nor lines end, so nothing is cut off; the line meets the same thing,
+//! (the balance heuristic), and of all exits that share it ([`super::kin`]). Of these places one is drawn in proportion to
+//! R_d over its density, where [Pharr2016, 15.4.2] draws evenly. More differs from there: neither radii nor lines end, so nothing is cut off; the line meets the same thing,
 //! not the same material, so that things which touch do not bleed into one another; and some lines are laid anywhere
 //! through the thing, since a profile's own radii seldom lead to its far side, from which a lamp behind it shines.
 
@@ -35,8 +35,8 @@ pub struct Bssrdf {
 /// A place where light enters.
 pub struct Entry {
     pub point: Point,
-    /// R_d over the density with which the place was drawn, both per squared scene unit.
-    pub weight: Rgb,
+    /// One over the chance with which it was drawn among the places on its line.
+    pub weight: f64,
 }
 
 /// The chance of each axis: the normal and two tangents.
@@ -52,8 +52,7 @@ impl Bssrdf {
 
     /// A place of the same thing from which light comes to `exit`; `None` when the line met nothing that sends any.
     pub fn entry(&self, world: &World, exit: &Point, random: &mut Random) -> Option<Entry> {
-        let (x, y) = exit.normal.any_orthonormal_pair();
-        let axes = [exit.normal, x, y];
+        let axes = axes(exit);
         let axis = [0, 0, 1, 2][random.choice(4)];
         let ball = world.balls[exit.thing()];
         let (center, radius) = match random.unit() < ANYWHERE {
@@ -62,39 +61,40 @@ impl Bssrdf {
         };
         let (sin, cos) = (2.0 * PI * random.unit()).sin_cos();
         let through = center + radius * (cos * axes[(axis + 1) % 3] + sin * axes[(axis + 2) % 3]);
-        let mut entries: Vec<Entry> = world
+        let places: Vec<(Point, f64)> = world
             .along(exit.thing(), through, axes[axis])
             .into_iter()
             .filter_map(|point| {
-                let offset = point.p - exit.p;
-                let density = self.density(axes, offset, point.flat, ball);
+                let density = self.density(exit, &point, ball);
                 // At no distance R_d is infinite, and no line comes upon a triangle from its edge: both have no chance.
-                (offset != DVec3::ZERO && density > 0.0).then(|| Entry { point, weight: self.r_d(offset) / density })
+                (point.p != exit.p && density > 0.0).then(|| (point, self.r_d(exit, &point).element_sum() / density))
             })
-            .filter(|entry| entry.weight != Rgb::ZERO)
+            .filter(|(_, weight)| *weight > 0.0)
             .collect();
-        let last = entries.len().checked_sub(1)?;
-        let total: f64 = entries.iter().map(|entry| entry.weight.element_sum()).sum();
+        let last = places.last()?;
+        let total: f64 = places.iter().map(|(_, weight)| weight).sum();
         let mut sought = random.unit() * total;
-        let place = entries.iter().position(|entry| {
-            sought -= entry.weight.element_sum();
+        let drawn = places.iter().find(|(_, weight)| {
+            sought -= weight;
             sought < 0.0
         });
-        let mut entry = entries.swap_remove(place.unwrap_or(last));
-        entry.weight *= total / entry.weight.element_sum();
-        Some(entry)
+        let (point, weight) = *drawn.unwrap_or(last);
+        Some(Entry { point, weight: total / weight })
     }
 
-    fn r_d(&self, offset: DVec3) -> Rgb {
-        let r = offset.length();
+    /// R_d between two places, per squared scene unit.
+    pub fn r_d(&self, exit: &Point, entry: &Point) -> Rgb {
+        let r = exit.p.distance(entry.p);
         Rgb::from_array(self.profiles.each_ref().map(|profile| profile.r_d_tabulated(r)))
     }
 
-    /// The density per area with which lines along all axes, at radii of all channels, find a place of that normal.
-    fn density(&self, axes: [DVec3; 3], offset: DVec3, normal: DVec3, ball: Ball) -> f64 {
+    /// The density per area with which lines from an exit, along all axes and at radii of all channels, find an entry on a
+    /// thing within that ball.
+    pub fn density(&self, exit: &Point, entry: &Point, ball: Ball) -> f64 {
+        let offset = entry.p - exit.p;
         let anywhere = ANYWHERE / (PI * ball.radius * ball.radius);
         let by_axis = |(axis, chance): (DVec3, f64)| {
-            let facing = chance * axis.dot(normal).abs();
+            let facing = chance * axis.dot(entry.flat).abs();
             if facing == 0.0 {
                 // Even where the density of radii is infinite.
                 return 0.0;
@@ -103,6 +103,12 @@ impl Bssrdf {
             let own = self.profiles.iter().map(|profile| profile.pdf(radius)).sum::<f64>() / 3.0;
             facing * ((1.0 - ANYWHERE) * own + anywhere)
         };
-        axes.into_iter().zip(CHANCES).map(by_axis).sum()
+        axes(exit).into_iter().zip(CHANCES).map(by_axis).sum()
     }
+}
+
+/// Along which lines are laid at a place where light leaves.
+fn axes(exit: &Point) -> [DVec3; 3] {
+    let (x, y) = exit.normal.any_orthonormal_pair();
+    [exit.normal, x, y]
 }

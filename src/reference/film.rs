@@ -1,5 +1,6 @@
 //! What samples add up to: mean and variance of every pixel, by part.
 
+use super::kin::SIDE;
 use super::path::Parts;
 use crate::image::Image;
 use crate::optics::Rgb;
@@ -25,7 +26,7 @@ fn place(part: Part) -> usize {
 pub struct Film {
     pub width: u32,
     pub height: u32,
-    /// The rows that are here: `first`, `first + step`, …
+    /// The bands of [`SIDE`] rows that are here: `first`, `first + step`, …
     pub first: u32,
     pub step: u32,
     /// Per pixel.
@@ -113,16 +114,24 @@ fn rgb(value: [f32; 3]) -> Rgb {
 }
 
 impl Film {
-    /// How many rows are here.
-    pub fn rows(first: u32, step: u32, height: u32) -> u32 {
-        if first >= height { 0 } else { (height - first).div_ceil(step) }
+    /// Black, after so many samples.
+    pub fn new((width, height): (u32, u32), (first, step): (u32, u32), samples: u64) -> Film {
+        let mut film = Film { width, height, first, step, samples, pixels: Vec::new() };
+        film.pixels = vec![Pixel::default(); film.rows().count() * width as usize];
+        film
+    }
+
+    /// The rows that are here.
+    pub fn rows(&self) -> impl Iterator<Item = u32> + use<> {
+        let height = self.height;
+        let bands = (self.first..height.div_ceil(SIDE)).step_by(self.step as usize);
+        bands.flat_map(move |band| band * SIDE..height.min((band + 1) * SIDE))
     }
 
     fn image(&self, value: impl Fn(&Pixel) -> [f32; 3]) -> Image {
         let mut image = Image::filled(self.width, self.height, [0.0; 3]);
-        for (i, row) in self.pixels.chunks(self.width as usize).enumerate() {
-            let y = self.first as usize + i * self.step as usize;
-            let start = y * self.width as usize;
+        for (y, row) in self.rows().zip(self.pixels.chunks(self.width as usize)) {
+            let start = (y * self.width) as usize;
             image.pixels[start..start + row.len()].iter_mut().zip(row).for_each(|(to, pixel)| *to = value(pixel));
         }
         image
@@ -177,9 +186,8 @@ impl Film {
                     first.width, first.height, first.samples, film.width, film.height, film.samples
                 ));
             }
-            for (i, row) in film.pixels.chunks(film.width as usize).enumerate() {
-                let y = film.first as usize + i * film.step as usize;
-                if rows[y].replace(row).is_some() {
+            for (y, row) in film.rows().zip(film.pixels.chunks(film.width as usize)) {
+                if rows[y as usize].replace(row).is_some() {
                     return Err(format!("row {y} is there twice"));
                 }
             }
@@ -229,13 +237,14 @@ mod tests {
     fn tiles_merge_into_the_whole_and_say_what_is_missing() {
         let pixel = |v: f32| Pixel { mean: [[v; 3]; PARTS], ..Pixel::default() };
         let tile = |first: u32| {
-            let rows = Film::rows(first, 2, 3);
-            let pixels = (0..rows).map(|i| pixel((first + 2 * i) as f32)).collect();
-            Film { width: 1, height: 3, first, step: 2, samples: 4, pixels }
+            let mut film = Film::new((1, 3 * SIDE - 1), (first, 2), 4);
+            film.pixels = film.rows().map(|y| pixel(y as f32)).collect();
+            film
         };
         let whole = Film::merged(&[tile(1), tile(0)]).unwrap();
-        assert_eq!(whole.picture(Part::Full).pixels, [[0.0; 3], [1.0; 3], [2.0; 3]]);
-        assert!(Film::merged(&[tile(0)]).unwrap_err().contains("row 1 is missing"));
+        let rows: Vec<[f32; 3]> = (0..3 * SIDE - 1).map(|y| [y as f32; 3]).collect();
+        assert_eq!(whole.picture(Part::Full).pixels, rows);
+        assert!(Film::merged(&[tile(0)]).unwrap_err().contains(&format!("row {SIDE} is missing")));
         assert!(Film::merged(&[tile(0), tile(0)]).unwrap_err().contains("twice"));
         assert!(Film::merged(&[tile(0), Film { samples: 8, ..tile(1) }]).unwrap_err().contains("samples"));
     }

@@ -119,9 +119,9 @@ impl Tracer {
             {
                 continue;
             }
-            let own = |to| walk.weight.mixed(phase(to));
+            let own = |to| walk.density_of(phase(to));
             if let Some((to, light)) = self.through_lobe(walk, i, lamp, thing, own, random) {
-                walk.sum.scattered += walk.color * walk.weight.value * phase(to) * light;
+                walk.gather(to, phase(to), light);
             }
         }
     }

@@ -15,6 +15,7 @@
 //! | [`light`] | lamps and the surroundings |
 //! | [`world`] | the scene as rays see it |
 //! | [`path`] | a path on its way: what it lies in and what it weighs |
+//! | [`kin`] | what paths of neighbouring pixels share |
 //! | [`film`] | means, variances, parts, tiles |
 //!
 //! Samples are added in steps that double their number; each step is a bake, named by the one before, so that what was
@@ -27,6 +28,7 @@ pub mod bssrdf;
 mod crossing;
 pub mod film;
 pub mod free_path;
+pub mod kin;
 pub mod layers;
 pub mod light;
 pub mod lobe;
@@ -46,6 +48,7 @@ use crate::scene::{self, Camera, LightKind, Object, Part, Scene, Sky, Substance,
 use crate::store::{Bake, Key, Plan, Run, Slot, Step};
 use bssrdf::Bssrdf;
 use film::{Film, Level, Moments};
+use kin::Strand;
 use glam::{DAffine3, DVec3};
 use layers::{Layer, Layers};
 use light::{Kind, Lamp, SkyImage};
@@ -83,8 +86,8 @@ pub struct Settings {
     pub time_s: f64,
     pub max_depth: u32,
     pub seed: u64,
-    /// Every `step`-th row from `first` on: (first, step).
-    pub rows: (u32, u32),
+    /// Every `step`-th band of rows from the `first` on: (first, step).
+    pub bands: (u32, u32),
 }
 
 /// Adds the steps that bring the picture to `samples` per pixel, at least 1.
@@ -96,8 +99,8 @@ pub fn plan(plan: &mut Plan, scene: &Scene, settings: &Settings, samples: u64) -
 pub fn doublings(plan: &mut Plan, scene: &Scene, settings: &Settings, samples: u64) -> Vec<Slot<Film>> {
     let tracer = tracer(plan, scene, settings);
     let mut more = |samples, before| {
-        let Settings { camera, size, seed, rows, .. } = *settings;
-        plan.bake(Trace { tracer, camera, size, seed, rows, samples, before })
+        let Settings { camera, size, seed, bands, .. } = *settings;
+        plan.bake(Trace { tracer, camera, size, seed, bands, samples, before })
     };
     let mut film = more((0, 1), None);
     let mut films = vec![film];
@@ -259,7 +262,7 @@ impl Step for BuildTracer {
         });
         let lamps = self.lamps.clone();
         let BuildTracer { light, max_depth, single, .. } = *self;
-        Ok(Tracer { world, lamps, sky, refracted, light, max_depth, single, joins: true })
+        Ok(Tracer { world, lamps, sky, refracted, light, max_depth, single, joins: true, kin: true })
     }
 }
 
@@ -273,7 +276,7 @@ struct Trace {
     camera: Camera,
     size: (u32, u32),
     seed: u64,
-    rows: (u32, u32),
+    bands: (u32, u32),
     /// From and up to.
     samples: (u64, u64),
     before: Option<Slot<Film>>,
@@ -293,36 +296,43 @@ impl Step for Trace {
     fn run(&self, run: &Run) -> Result<Film, Problem> {
         let tracer = run.get(self.tracer);
         let before = self.before.map(|slot| run.get(slot));
-        let ((width, height), (first, step)) = (self.size, self.rows);
-        let count = Film::rows(first, step, height);
+        let (width, height) = self.size;
+        let mut film = Film::new(self.size, self.bands, self.samples.1);
         let eye = Eye::new(&self.camera, self.size);
         let inside = around(&tracer.world, self.camera.eye);
+        // The paths of a block are kin; which block a pixel lies in is the same for every tile.
+        let rows: Vec<u32> = film.rows().collect();
+        let blocks: Vec<(usize, u32)> = (0..rows.len())
+            .step_by(kin::SIDE as usize)
+            .flat_map(|row| (0..width).step_by(kin::SIDE as usize).map(move |x| (row, x)))
+            .collect();
         let done = AtomicUsize::new(0);
-        let rows: Vec<Vec<film::Pixel>> = (0..count)
-            .into_par_iter()
-            .map(|row| {
-                let y = first + row * step;
-                let pixels = (0..width)
-                    .map(|x| {
-                        let mut moments = Moments::default();
-                        let pixel = y as u64 * width as u64 + x as u64;
-                        for sample in self.samples.0..self.samples.1 {
-                            let mut random = Random::new(self.seed, pixel, sample);
-                            let (a, b) = random.pair();
-                            let direction = eye.direction(x as f64 + a, y as f64 + b);
-                            let (parts, is_object) = tracer.trace(self.camera.eye, direction, inside, &mut random);
-                            moments.add(&parts, is_object);
-                        }
-                        let place = (row * width + x) as usize;
-                        let earlier = before.as_ref().map(|film| (&film.pixels[place], film.samples));
-                        moments.pixel(earlier)
-                    })
-                    .collect();
-                let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-                run.tick(done as f64 / count as f64).map(|()| pixels)
-            })
-            .collect::<Result<_, Problem>>()?;
-        Ok(Film { width, height, first, step, samples: self.samples.1, pixels: rows.concat() })
+        let trace = |&(row, x): &(usize, u32)| {
+            let rows = rows.iter().enumerate().skip(row).take(kin::SIDE as usize);
+            let pixels: Vec<(usize, u32, u32)> = rows
+                .flat_map(|(row, y)| (x..width.min(x + kin::SIDE)).map(move |x| (row * width as usize + x as usize, x, *y)))
+                .collect();
+            let mut moments = vec![Moments::default(); pixels.len()];
+            for sample in self.samples.0..self.samples.1 {
+                let path = |&(_, x, y): &(usize, u32, u32)| {
+                    let mut random = Random::new(self.seed, y as u64 * width as u64 + x as u64, sample);
+                    let (a, b) = random.pair();
+                    tracer.trace(self.camera.eye, eye.direction(x as f64 + a, y as f64 + b), inside, &mut random)
+                };
+                let mut strands: Vec<Strand> = pixels.iter().map(path).collect();
+                tracer.settle(&mut strands);
+                strands.iter().zip(&mut moments).for_each(|(strand, moments)| moments.add(&strand.parts, strand.is_object));
+            }
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            run.tick(done as f64 / blocks.len() as f64)?;
+            let pixel = |(moments, (place, ..)): (Moments, &(usize, u32, u32))| {
+                (*place, moments.pixel(before.as_ref().map(|film| (&film.pixels[*place], film.samples))))
+            };
+            Ok(moments.into_iter().zip(&pixels).map(pixel).collect())
+        };
+        let traced: Vec<Vec<(usize, film::Pixel)>> = blocks.par_iter().map(trace).collect::<Result<_, Problem>>()?;
+        traced.into_iter().flatten().for_each(|(place, pixel)| film.pixels[place] = pixel);
+        Ok(film)
     }
 }
 

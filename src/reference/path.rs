@@ -1,5 +1,6 @@
 //! A path on its way: where it is, what it lies in, and what its light weighs.
 
+use super::kin::Shared;
 use super::random::Random;
 use super::world::Place;
 use crate::optics::Rgb;
@@ -108,6 +109,8 @@ pub struct Walk {
     pub struck: bool,
     pub depth: u32,
     pub sum: Sum,
+    /// What kin may share of it.
+    pub shared: Option<Shared>,
 }
 
 /// Light by whether it was scattered.

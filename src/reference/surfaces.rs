@@ -4,6 +4,7 @@
 //! A way is drawn at random, and lamps and the sky's image are joined where it begins: the two share out what both find, by
 //! the balance heuristic.
 
+use super::bssrdf::Entry;
 use super::light::{Lamp, Ray};
 use super::random::Random;
 use super::volume::Tracer;
@@ -63,18 +64,16 @@ impl Tracer {
     pub(super) fn scattered(&self, thing: &Thing, point: &Point, d: DVec3, random: &mut Random) -> Option<Bounce> {
         // A sheet of paint is seen from behind too: its normal turns to the eye.
         let side = if d.dot(point.flat) < 0.0 { 1.0 } else { -1.0 };
-        let leaving = |surface: &Boundary| {
-            let cos = -side * d.dot(point.normal);
-            thing.color(surface, point) * (1.0 - fresnel_dielectric(cos.clamp(0.0, 1.0), surface.ior))
-        };
         match &thing.matter {
             // Lambertian: what leaves, leaves where it entered.
             Matter::Opaque { surface, albedo } => {
-                Some(self.entering(point, side, surface.ior, *albedo * leaving(surface), random))
+                Some(self.entering(point, side, surface.ior, *albedo * thing.leaving(surface, point, d), random))
             }
             Matter::Bssrdf { surface, bssrdf } if side > 0.0 => {
-                let entry = bssrdf.entry(&self.world, point, random)?;
-                Some(self.entering(&entry.point, 1.0, surface.ior, entry.weight * leaving(surface), random))
+                let Entry { point: entry, weight } = bssrdf.entry(&self.world, point, random)?;
+                let density = bssrdf.density(point, &entry, self.world.balls[point.thing()]);
+                let scale = weight / density * bssrdf.r_d(point, &entry) * thing.leaving(surface, point, d);
+                Some(self.entering(&entry, 1.0, surface.ior, scale, random))
             }
             _ => None,
         }
@@ -82,7 +81,7 @@ impl Tracer {
 
     /// Light that comes from outside, on the normal's `side`, and enters: (1 - F(cos)) cos / (c pi) of its radiance, which
     /// is 1 for an even sky.
-    fn entering(&self, point: &Point, side: f64, ior: f64, scale: Rgb, random: &mut Random) -> Bounce {
+    pub(super) fn entering(&self, point: &Point, side: f64, ior: f64, scale: Rgb, random: &mut Random) -> Bounce {
         let (flat, normal) = (side * point.flat, side * point.normal);
         let enters =
             |cos: f64| (1.0 - fresnel_dielectric(cos.clamp(0.0, 1.0), ior)) / (PI * diffuse_transmittance(ior));
@@ -139,5 +138,14 @@ impl Tracer {
     pub(super) fn reaches(&self, p: DVec3, ray: &Ray, on: Option<Place>) -> bool {
         // The lamp itself stands at the end.
         self.world.is_free(p, ray.direction, ray.distance * (1.0 - 1e-9), on)
+    }
+}
+
+impl Thing {
+    /// The share of light scattered below a boundary that leaves against `d`, on the side from which that comes.
+    pub(super) fn leaving(&self, surface: &Boundary, point: &Point, d: DVec3) -> Rgb {
+        // A sheet of paint is seen from behind too: its normal turns to the eye.
+        let cos = d.dot(point.normal) * d.dot(point.flat).signum();
+        self.color(surface, point) * (1.0 - fresnel_dielectric(cos.clamp(0.0, 1.0), surface.ior))
     }
 }

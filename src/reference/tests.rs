@@ -33,7 +33,7 @@ fn tracer(things: Vec<(Mesh, Matter)>, lamps: Vec<Lamp>, sky: Option<f64>, light
     };
     let refracted = lamps.iter().enumerate().flat_map(beams).collect();
     let sky = sky.map(|radiance| light::Sky { scale: Rgb::splat(radiance), image: None, shadow: true });
-    Tracer { world, lamps, sky, refracted, light, max_depth, single: false, joins: true }
+    Tracer { world, lamps, sky, refracted, light, max_depth, single: false, joins: true, kin: true }
 }
 
 /// A square light at a height, of a half-edge, that shines down; and its mesh.
@@ -68,7 +68,9 @@ fn measure(
             for i in 0..paths / 64 {
                 let mut random = Random::new(9, batch, i);
                 let (origin, direction) = ray(&mut random);
-                let value = part(&tracer.trace(origin, direction, Inside::default(), &mut random).0);
+                let mut strand = [tracer.trace(origin, direction, Inside::default(), &mut random)];
+                tracer.settle(&mut strand);
+                let value = part(&strand[0].parts);
                 sum += value;
                 squares += value * value;
             }
@@ -289,5 +291,6 @@ fn nothing_is_lost_between_white_surfaces() {
 }
 
 mod bssrdf;
+mod kin;
 mod layers;
 mod single;

@@ -10,8 +10,9 @@
 //! Radiance is counted per squared index of the medium that it travels in. Lengths are scene units.
 
 use super::free_path::End;
+use super::kin::{self, Exit, Shared, Strand};
 use super::light::{Kind, Lamp, Ray, Sky};
-use super::path::{Inside, Parts, Sum, Walk, Weight};
+use super::path::{Inside, Sum, Walk, Weight};
 use super::random::Random;
 use super::refracted::Refracted;
 use super::surfaces::Bounce;
@@ -43,43 +44,58 @@ pub struct Tracer {
     /// Whether lamps with extent and the sky are joined to vertices. Without, paths must find them by themselves: the same
     /// picture, with more noise.
     pub joins: bool,
+    /// Whether paths leave their finds to their kin. Without, likewise.
+    pub kin: bool,
 }
 
 impl Tracer {
-    /// One path from the eye, which lies inside the things `inside`; and whether it meets an object.
-    pub fn trace(&self, eye: DVec3, direction: DVec3, inside: Inside, random: &mut Random) -> (Parts, bool) {
-        let mut parts = Parts::default();
+    /// One path from the eye, which lies inside the things `inside`; to be [settled](Tracer::settle) with its kin, if only
+    /// with itself.
+    pub fn trace(&self, eye: DVec3, direction: DVec3, inside: Inside, random: &mut Random) -> Strand {
+        let mut strand = Strand { is_object: true, ..Strand::default() };
         if !inside.is_nothing() {
             // From within a medium there is no boundary to split at.
-            let light = self.walk_from(self.start(eye, direction, None, inside, random), None, random);
-            (parts.scattered, parts.unscattered) = (light.scattered, light.unscattered);
-            return (parts, true);
+            let mut walk = self.start(eye, direction, None, inside, random);
+            walk.shared = self.kin.then(Shared::default);
+            strand.end(self.walk_from(walk, None, random));
+            return strand;
         }
-        let Some(point) = self.world.meet(eye, direction, f64::INFINITY, None) else {
-            parts.unscattered = self.sky.as_ref().map_or(Rgb::ZERO, |sky| sky.radiance(direction));
-            return (parts, false);
-        };
-        (self.seen(&point, direction, random), !self.is_emitter(&point))
+        match self.world.meet(eye, direction, f64::INFINITY, None) {
+            Some(point) => self.see(&mut strand, &point, direction, random),
+            None => {
+                strand.is_object = false;
+                strand.parts.unscattered = self.sky.as_ref().map_or(Rgb::ZERO, |sky| sky.radiance(direction));
+            }
+        }
+        strand
     }
 
     /// What a surface sends to the eye.
-    fn seen(&self, point: &Point, direction: DVec3, random: &mut Random) -> Parts {
-        let mut parts = Parts::default();
+    fn see(&self, strand: &mut Strand, point: &Point, direction: DVec3, random: &mut Random) {
         let thing = &self.world.things[point.thing()];
         match &thing.matter {
             Matter::Emitter(_) => {
-                parts.unscattered = self.emitted(point, point.t * direction).map_or(Rgb::ZERO, |(light, _)| light)
+                strand.is_object = false;
+                strand.parts.unscattered = self.emitted(point, point.t * direction).map_or(Rgb::ZERO, |(light, _)| light)
             }
             Matter::Translucent { .. } | Matter::Bssrdf { .. } if direction.dot(point.flat) > 0.0 => {
                 // The back of a mesh that is not closed: nothing is entered.
-                parts.unscattered = self.radiance(point.p, direction, point.place, None, 1, random);
+                strand.parts.unscattered = self.radiance(point.p, direction, point.place, None, 1, random);
+            }
+            Matter::Bssrdf { surface, bssrdf } if self.kin => {
+                strand.parts.glossy = self.follow(self.gloss(thing, surface, point, direction, random), random);
+                let entry = bssrdf.entry(&self.world, point, random).map(|entry| {
+                    let light = self.entering(&entry.point, 1.0, surface.ior, Rgb::ONE, random);
+                    (entry, self.follow(Some(light), random))
+                });
+                strand.exit = Some(Exit { point: *point, weight: thing.leaving(surface, point, direction), entry });
             }
             Matter::Opaque { surface, .. } | Matter::Bssrdf { surface, .. } => {
-                parts.glossy = self.follow(self.gloss(thing, surface, point, direction, random), random);
-                parts.scattered = self.follow(self.scattered(thing, point, direction, random), random);
+                strand.parts.glossy = self.follow(self.gloss(thing, surface, point, direction, random), random);
+                strand.parts.scattered = self.follow(self.scattered(thing, point, direction, random), random);
             }
             Matter::Translucent { surface, .. } => {
-                parts.glossy = self.follow(self.gloss(thing, surface, point, direction, random), random);
+                strand.parts.glossy = self.follow(self.gloss(thing, surface, point, direction, random), random);
                 let facing = self.facing(thing, surface, point, direction, Inside::default());
                 let (into, share) = match facing.is_smooth() {
                     true => {
@@ -93,16 +109,16 @@ impl Tracer {
                         (split.refracted, (1.0 - split.reflectance) * unhidden)
                     }
                 };
-                let Some(into) = into.filter(|_| share > 0.0) else { return parts };
+                let Some(into) = into.filter(|_| share > 0.0) else { return };
                 let inside = Inside::default().with(point.thing());
                 let mut walk = self.start(point.p, into, Some(point.place), inside, random);
                 walk.color = thing.color(surface, point);
                 walk.depth = 1;
-                let light = self.walk_from(walk, None, random);
-                (parts.scattered, parts.unscattered) = (share * light.scattered, share * light.unscattered);
+                walk.weight.value *= share;
+                walk.shared = self.kin.then(Shared::default);
+                strand.end(self.walk_from(walk, None, random));
             }
         }
-        parts
     }
 
     fn start(&self, origin: DVec3, direction: DVec3, on: Option<Place>, inside: Inside, random: &mut Random) -> Walk {
@@ -123,6 +139,7 @@ impl Tracer {
             struck: false,
             depth: 0,
             sum: Sum::default(),
+            shared: None,
         }
     }
 
@@ -146,7 +163,7 @@ impl Tracer {
         }
         let mut walk = self.start(p, d, Some(on), Inside::default(), random);
         (walk.density, walk.depth, walk.counted) = (density, depth, true);
-        let sum = self.walk_from(walk, met, random);
+        let sum = self.walk_from(walk, met, random).sum;
         light + sum.scattered + sum.unscattered
     }
 
@@ -208,7 +225,7 @@ impl Tracer {
     }
 
     /// Follows a path to its end. `met` is what its ray meets first, if that is known already.
-    fn walk_from(&self, mut walk: Walk, mut met: Option<Point>, random: &mut Random) -> Sum {
+    fn walk_from(&self, mut walk: Walk, mut met: Option<Point>, random: &mut Random) -> Walk {
         loop {
             let flight = match self.single && walk.struck {
                 true => self.passage(&walk, random),
@@ -219,15 +236,18 @@ impl Tracer {
                 walk.add(self.shining(walk.origin, walk.direction, met, walk.density, walk.passed));
             }
             if walk.depth >= self.max_depth {
-                return walk.sum;
+                return walk;
             }
             walk.depth += 1;
             walk.weight = flight.weight;
             match flight.end {
                 End::Surface(point) => {
                     walk.below = None;
+                    if let Some(shared) = &mut walk.shared {
+                        shared.pass_surface();
+                    }
                     if !self.cross(&mut walk, point, random) {
-                        return walk.sum;
+                        return walk;
                     }
                     walk.struck &= !walk.inside.is_nothing();
                 }
@@ -235,13 +255,13 @@ impl Tracer {
                     (walk.origin, walk.on, walk.below) = (p, None, below);
                     self.scatter(&mut walk, medium, random);
                 }
-                End::Away => return walk.sum,
+                End::Away => return walk,
             }
             // Roulette by weight: what is left of the light decides, so that high albedos live long.
             let left = walk.weight.value.max_element();
-            if left < 0.1 {
+            if left < 0.1 && !walk.shared.as_ref().is_some_and(Shared::is_at_stem) {
                 if random.unit() >= left / 0.1 {
-                    return walk.sum;
+                    return walk;
                 }
                 walk.weight.value *= 0.1 / left;
             }
@@ -251,6 +271,7 @@ impl Tracer {
     /// A path meets a medium's particle: light that is scattered there, and the way on.
     fn scatter(&self, walk: &mut Walk, medium: &Medium, random: &mut Random) {
         (walk.scattered, walk.struck) = (true, true);
+        walk.share(self.shares(walk, medium), kin::lengths(medium), random);
         let from = walk.direction;
         // Channels may scatter differently: the direction is drawn for the hero, and weighs like a free path.
         let phase =
@@ -265,10 +286,9 @@ impl Tracer {
             self.join_lobes(walk, thing, phase, random);
         }
         let parameter = medium.parameter[walk.weight.hero];
-        walk.direction = around(from, -medium.phase.sample(random.unit(), parameter), random.unit());
-        let values = phase(walk.direction);
-        (walk.density, walk.joined_through, walk.passed) = (Some(walk.weight.mixed(values)), true, 0.0);
-        walk.weight.event(values, values);
+        let to = around(from, -medium.phase.sample(random.unit(), parameter), random.unit());
+        (walk.joined_through, walk.passed) = (true, 0.0);
+        walk.go(to, phase(to));
     }
 
     /// Adds the light of lamps at a vertex in a medium, `phase` being the share that goes on along the path, 1/sr.
@@ -286,7 +306,7 @@ impl Tracer {
                 let luck = random.exponential();
                 let through = |to, length| fill.transmittance(p, below, to, length, random);
                 refracted.each(&self.world, p, lamp.shadow, (fill.thinnest(), luck), through, |to, light| {
-                    walk.sum.scattered += walk.color * walk.weight.value * phase(to) * light;
+                    walk.gather(to, phase(to), light);
                 });
             }
             if walk.inside.only().is_some_and(|thing| self.is_behind_glass(lamp, thing)) {
@@ -339,9 +359,8 @@ impl Tracer {
             is_out = inside.innermost().is_none();
             (p, on, left) = (point.p, Some(point.place), left - point.t);
         }
-        let density = walk.weight.mixed(phase);
-        let share = ray.density.map_or(1.0, |own| own / (own + density));
-        walk.sum.scattered += share * walk.color * walk.weight.value * through * phase * ray.irradiance;
+        let share = ray.density.map_or(1.0, |own| own / (own + walk.density_of(phase)));
+        walk.gather(ray.direction, phase, share * through * ray.irradiance);
     }
 }
 

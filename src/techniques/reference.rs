@@ -80,7 +80,7 @@ impl Reference {
             time_s: view.time_s,
             max_depth: self.max_depth.unwrap_or(scene.reference.max_depth),
             seed: self.seed.unwrap_or(scene.reference.seed),
-            rows: (0, 1),
+            bands: (0, 1),
         }
     }
 

@@ -80,7 +80,8 @@ fn entries_are_found_wherever_they_are() {
         for _ in 0..samples {
             let value = bssrdf.entry(&world, &exit, &mut random).map_or(Rgb::ZERO, |entry| {
                 assert_eq!(entry.point.thing(), 0);
-                entry.weight * light(entry.point.p)
+                let weight = entry.weight / bssrdf.density(&exit, &entry.point, world.balls[0]);
+                weight * light(entry.point.p) * bssrdf.r_d(&exit, &entry.point)
             });
             (sum, squares) = (sum + value, squares + value * value);
         }
@@ -177,7 +178,7 @@ fn picture(size: f64, integrator: Integrator, threads: usize) -> (crate::store::
         time_s: 0.0,
         max_depth: 16,
         seed: 3,
-        rows: (0, 1),
+        bands: (0, 1),
     };
     let mut plan = Plan::default();
     let slot = super::plan(&mut plan, &scene, &settings, 8);

@@ -1,0 +1,76 @@
+//! Paths that share what they find, against paths that do not.
+
+use super::*;
+
+/// The mean over all paths of a few blocks of kin, and its standard error; blocks count as one sample each.
+fn measure_kin(
+    tracer: &Tracer,
+    blocks: u64,
+    ray: impl Fn(&mut Random) -> (DVec3, DVec3) + Sync,
+) -> (Rgb, Rgb) {
+    let block = |block: u64| {
+        let mut strands: Vec<kin::Strand> = (0..8)
+            .map(|path| {
+                let mut random = Random::new(3, block, path);
+                let (origin, direction) = ray(&mut random);
+                tracer.trace(origin, direction, Inside::default(), &mut random)
+            })
+            .collect();
+        tracer.settle(&mut strands);
+        strands.iter().map(|strand| strand.parts.scattered).sum::<Rgb>() / strands.len() as f64
+    };
+    let values: Vec<Rgb> = (0..blocks).into_par_iter().map(block).collect();
+    let n = blocks as f64;
+    let mean = values.iter().sum::<Rgb>() / n;
+    let squares = values.iter().map(|value| (*value - mean) * (*value - mean)).sum::<Rgb>();
+    (mean, (squares / (n * (n - 1.0))).sqrt())
+}
+
+fn agree_with_plain(what: &str, mut tracer: Tracer, blocks: u64) {
+    let ray = |random: &mut Random| {
+        let (a, b) = random.pair();
+        (DVec3::new(0.6 * a, 0.6 * b, 5.0), DVec3::NEG_Z)
+    };
+    let (a, a_error) = measure_kin(&tracer, blocks, ray);
+    tracer.kin = false;
+    let (b, b_error) = measure(&tracer, 32 * blocks, ray, |p| p.scattered);
+    let error = (a_error * a_error + b_error * b_error).sqrt();
+    let z = (a - b) / error;
+    println!("{what}: {a} +- {a_error}, {b} +- {b_error}, z {z}");
+    assert!(z.abs().max_element() < 4.0, "{what}: {a} +- {a_error}, {b} +- {b_error}, z {z}");
+    assert!((0.02 * b / error).max_element() > 4.0, "{what}: {b} +- {error} would hide a bias of 2 %");
+}
+
+#[test]
+fn kin_change_nothing_but_noise() {
+    let (rect, quad) = light_above(3.0, 2.0);
+    let knot = || shapes::torus_knot(2, 3, 0.5, 0.25, (96, 12));
+    let sun = || sun(DVec3::new(-0.4, -0.5, -1.0));
+    let colored = (Rgb::new(0.1, 0.3, 0.6), Rgb::new(2.0, 4.0, 9.0));
+    for (what, ior, roughness, g, light, max_depth, blocks) in [
+        ("smooth", 1.4, 0.0, 0.3, Light::Full, 1000, 12_000),
+        ("smooth and cut short", 1.4, 0.0, -0.4, Light::Full, 6, 6_000),
+        ("rough", 1.3, 0.4, 0.0, Light::Direct, 1000, 8_000),
+        ("index-matched", 1.0, 0.0, 0.4, Light::Full, 1000, 8_000),
+        ("index-matched and cut short", 1.0, 0.0, 0.4, Light::Direct, 5, 6_000),
+    ] {
+        let lamp = Lamp { kind: rect.clone(), shadow: true };
+        let things = vec![(knot(), translucent(ior, roughness, colored.0, colored.1, g)), (quad.clone(), Matter::Emitter(0))];
+        agree_with_plain(what, tracer(things, vec![lamp, sun()], Some(0.3), light, max_depth), blocks);
+    }
+}
+
+#[test]
+fn kin_change_nothing_but_noise_of_profiles() {
+    let (rect, quad) = light_above(3.0, 2.0);
+    let medium = medium::Medium::extinction(Rgb::new(4.0, 6.0, 15.0), Rgb::new(0.98, 0.9, 0.8), Rgb::ZERO);
+    let bssrdf = Bssrdf::new(Default::default(), medium, Phase::HenyeyGreenstein, 1.3);
+    let matter = Matter::Bssrdf { surface: surface(1.3, 0.0), bssrdf: Box::new(bssrdf) };
+    let knot = shapes::torus_knot(2, 3, 0.5, 0.25, (96, 12));
+    for light in [Light::Direct, Light::Full] {
+        let things = vec![(knot.clone(), matter.clone()), (quad.clone(), Matter::Emitter(0))];
+        let lamp = Lamp { kind: rect.clone(), shadow: true };
+        let tracer = tracer(things, vec![lamp, sun(DVec3::new(-0.4, -0.5, -1.0))], Some(0.3), light, 16);
+        agree_with_plain(&format!("{light:?}"), tracer, 6_000);
+    }
+}
