@@ -5,8 +5,9 @@
 //!
 //! x_i is sought by a line along the normal at x_o or along one of two tangents, at a radius drawn from one channel's
 //! profile [King2013]. Each place where the line meets the thing has a density, that of all axes and channels together
-//! (the balance heuristic), and of all exits that share it ([`super::kin`]). Of these places one is drawn in proportion to
-//! R_d over its density, where [Pharr2016, 15.4.2] draws evenly. More differs from there: neither radii nor lines end, so nothing is cut off; the line meets the same thing,
+//! (the balance heuristic), and of all exits that share it ([`super::kin`]). Of these places one is drawn: half the time in
+//! proportion to R_d over its density, half the time evenly, as [Pharr2016, 15.4.2] always does, since what is nothing to
+//! this exit may be much to another. More differs from there: neither radii nor lines end, so nothing is cut off; the line meets the same thing,
 //! not the same material, so that things which touch do not bleed into one another; and some lines are laid anywhere
 //! through the thing, since a profile's own radii seldom lead to its far side, from which a lamp behind it shines.
 
@@ -69,17 +70,18 @@ impl Bssrdf {
                 // At no distance R_d is infinite, and no line comes upon a triangle from its edge: both have no chance.
                 (point.p != exit.p && density > 0.0).then(|| (point, self.r_d(exit, &point).element_sum() / density))
             })
-            .filter(|(_, weight)| *weight > 0.0)
             .collect();
-        let last = places.last()?;
+        let last = places.len().checked_sub(1)?;
         let total: f64 = places.iter().map(|(_, weight)| weight).sum();
-        let mut sought = random.unit() * total;
-        let drawn = places.iter().find(|(_, weight)| {
-            sought -= weight;
+        let even = 1.0 / places.len() as f64;
+        let chance = |weight: f64| if total > 0.0 { 0.5 * (even + weight / total) } else { even };
+        let mut sought = random.unit();
+        let drawn = places.iter().position(|(_, weight)| {
+            sought -= chance(*weight);
             sought < 0.0
         });
-        let (point, weight) = *drawn.unwrap_or(last);
-        Some(Entry { point, weight: total / weight })
+        let (point, weight) = places[drawn.unwrap_or(last)];
+        Some(Entry { point, weight: 1.0 / chance(weight) })
     }
 
     /// R_d between two places, per squared scene unit.

@@ -149,7 +149,12 @@ impl Walk {
 
     /// Adds light that reaches a particle from a direction; `phase` of it goes on along the path, 1/sr.
     pub fn gather(&mut self, to: DVec3, phase: Rgb, light: Rgb) {
-        match self.shared.as_mut().filter(|shared| shared.stage == Stage::AtFind).and_then(|shared| shared.find.as_mut()) {
+        match self
+            .shared
+            .as_mut()
+            .filter(|shared| shared.stage == Stage::AtFind)
+            .and_then(|shared| shared.find.as_mut())
+        {
             Some(find) => find.joined.push((to, light)),
             None => self.sum.scattered += self.color * self.weight.value * phase * light,
         }

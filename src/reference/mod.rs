@@ -48,8 +48,8 @@ use crate::scene::{self, Camera, LightKind, Object, Part, Scene, Sky, Substance,
 use crate::store::{Bake, Key, Plan, Run, Slot, Step};
 use bssrdf::Bssrdf;
 use film::{Film, Level, Moments};
-use kin::Strand;
 use glam::{DAffine3, DVec3};
+use kin::Strand;
 use layers::{Layer, Layers};
 use light::{Kind, Lamp, SkyImage};
 use path::Inside;
@@ -296,7 +296,7 @@ impl Step for Trace {
     fn run(&self, run: &Run) -> Result<Film, Problem> {
         let tracer = run.get(self.tracer);
         let before = self.before.map(|slot| run.get(slot));
-        let (width, height) = self.size;
+        let width = self.size.0;
         let mut film = Film::new(self.size, self.bands, self.samples.1);
         let eye = Eye::new(&self.camera, self.size);
         let inside = around(&tracer.world, self.camera.eye);
@@ -310,7 +310,9 @@ impl Step for Trace {
         let trace = |&(row, x): &(usize, u32)| {
             let rows = rows.iter().enumerate().skip(row).take(kin::SIDE as usize);
             let pixels: Vec<(usize, u32, u32)> = rows
-                .flat_map(|(row, y)| (x..width.min(x + kin::SIDE)).map(move |x| (row * width as usize + x as usize, x, *y)))
+                .flat_map(|(row, y)| {
+                    (x..width.min(x + kin::SIDE)).map(move |x| (row * width as usize + x as usize, x, *y))
+                })
                 .collect();
             let mut moments = vec![Moments::default(); pixels.len()];
             for sample in self.samples.0..self.samples.1 {
@@ -321,7 +323,10 @@ impl Step for Trace {
                 };
                 let mut strands: Vec<Strand> = pixels.iter().map(path).collect();
                 tracer.settle(&mut strands);
-                strands.iter().zip(&mut moments).for_each(|(strand, moments)| moments.add(&strand.parts, strand.is_object));
+                strands
+                    .iter()
+                    .zip(&mut moments)
+                    .for_each(|(strand, moments)| moments.add(&strand.parts, strand.is_object));
             }
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             run.tick(done as f64 / blocks.len() as f64)?;

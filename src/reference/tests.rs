@@ -33,7 +33,7 @@ fn tracer(things: Vec<(Mesh, Matter)>, lamps: Vec<Lamp>, sky: Option<f64>, light
     };
     let refracted = lamps.iter().enumerate().flat_map(beams).collect();
     let sky = sky.map(|radiance| light::Sky { scale: Rgb::splat(radiance), image: None, shadow: true });
-    Tracer { world, lamps, sky, refracted, light, max_depth, single: false, joins: true, kin: true }
+    Tracer { world, lamps, sky, refracted, light, max_depth, single: false, joins: true, kin: false }
 }
 
 /// A square light at a height, of a half-edge, that shines down; and its mesh.
@@ -138,7 +138,9 @@ fn a_half_space_sends_back_its_albedo() {
         let albedo = Rgb::new(0.5, 0.9, 0.97);
         let matter = translucent(ior, 0.0, 10.0 * (1.0 - albedo), 10.0 * albedo, 0.0);
         let slab = shapes::slab(DVec3::new(40.0, 20.0, 40.0), (1, 1));
-        let tracer = tracer(vec![(slab, matter)], Vec::new(), Some(1.0), Light::Direct, 100_000);
+        let mut tracer = tracer(vec![(slab, matter)], Vec::new(), Some(1.0), Light::Direct, 100_000);
+        // A path that is its own only kin.
+        tracer.kin = true;
         // The sky is even, so light that enters everywhere and leaves towards the eye is, by reciprocity, light that
         // enters along the ray and leaves anywhere.
         let down = |_: &mut Random| (DVec3::new(0.1, 15.0, 0.2), DVec3::NEG_Y);

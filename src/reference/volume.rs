@@ -76,7 +76,8 @@ impl Tracer {
         match &thing.matter {
             Matter::Emitter(_) => {
                 strand.is_object = false;
-                strand.parts.unscattered = self.emitted(point, point.t * direction).map_or(Rgb::ZERO, |(light, _)| light)
+                strand.parts.unscattered =
+                    self.emitted(point, point.t * direction).map_or(Rgb::ZERO, |(light, _)| light)
             }
             Matter::Translucent { .. } | Matter::Bssrdf { .. } if direction.dot(point.flat) > 0.0 => {
                 // The back of a mesh that is not closed: nothing is entered.
