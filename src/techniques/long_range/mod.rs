@@ -136,7 +136,8 @@ fn far(
         shader: surface.shader("techniques/long_range/far.wgsl", &[])?,
         output: ("blocks", 16),
         count: Count::Known(blocks),
-        dispatches: vec![Dispatch { count: blocks, binds: Vec::new() }],
+        // A workgroup each.
+        dispatches: vec![Dispatch { count: 64 * blocks, binds: Vec::new() }],
         binds,
     })))
 }
