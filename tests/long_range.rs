@@ -212,6 +212,23 @@ fn splitting_triangles_changes_nothing() {
 }
 
 #[test]
+fn as_many_patches_as_there_may_be_lose_no_light() {
+    let mut studio = ready();
+    // From behind, so that all light crosses the plate: more splats than some devices allow turns of a loop.
+    let mut plate = |splats: u32| {
+        studio.picture(&format!(
+            r#"mm_per_unit: 6, camera: (eye: (0, 0, 6), target: (0, 0, 0), fov_y_deg: 30),
+            lights: [Directional(direction: (0, 0, 1), irradiance: 5)],
+            objects: [(name: "plate", mesh: Slab(size: (2, 2, 0.6), segments: (100, 100)), material: "milk.ron")],
+            view: (technique: LongRange(splats: {splats}), size: (24, 24), antialias: 1)"#
+        ))
+    };
+    let ratio = mean(&plate(100_000)) / mean(&plate(2000));
+    println!("{ratio}");
+    assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
+}
+
+#[test]
 fn what_touches_does_not_bleed() {
     let mut studio = ready();
     studio.write("red.ron", MILK.replace("(0.5, 0.9, 0.98)", "(0.9, 0.1, 0.1)"));

@@ -1,5 +1,6 @@
-// Light from all splats at one pixel of each block of 4 x 4 that shows the object. A sum in their order is the same every
-// time, and needs no blending of 32-bit floats, which few devices have.
+// Light from all splats at one pixel of each block of 4 x 4 that shows the object. Each invocation of a block's workgroup
+// adds up every 64th splat. Sums in a fixed order are the same every time, and need no blending of 32-bit floats, which few
+// devices have. One loop over all splats would be cut short by llvmpipe, which leaves a shader after 65,535 turns.
 
 #include "lib/element.wgsl"
 #include "techniques/kernel.wgsl"
@@ -15,6 +16,7 @@ struct Whose {
 @group(0) @binding(3) var<storage, read_write> blocks: array<vec4f>;
 
 const BLOCK: u32 = 4u;
+const LANES: u32 = 64u;
 const PI: f32 = 3.14159265358979;
 
 // The block's pixels from the middle outwards.
@@ -24,17 +26,14 @@ fn spiral(i: u32) -> vec2u {
     return vec2u(order[i] & 3u, order[i] >> 2u);
 }
 
-@compute @workgroup_size(64)
-fn compute(@builtin(global_invocation_id) id: vec3u) {
-    let i = element(id);
-    if i >= arrayLength(&blocks) {
-        return;
-    }
+// Where the block's pixel lies in eye space, and its place in the picture, -1 for none.
+var<workgroup> receiver: vec4f;
+var<workgroup> sums: array<vec3f, LANES>;
+
+fn find_receiver(block: u32) -> vec4f {
     let size = textureDimensions(position_map);
     let wide = (size.x + BLOCK - 1u) / BLOCK;
-    let corner = BLOCK * vec2u(i % wide, i / wide);
-    var found = vec4f(0.0);
-    var index = -1.0;
+    let corner = BLOCK * vec2u(block % wide, block / wide);
     for (var k = 0u; k < 16u; k++) {
         let at = corner + spiral(k);
         if any(at >= size) {
@@ -42,27 +41,58 @@ fn compute(@builtin(global_invocation_id) id: vec3u) {
         }
         let position = textureLoad(position_map, at, 0);
         if u32(position.w) == whose.object + 1u {
-            found = position;
-            index = f32(at.y * size.x + at.x);
+            return vec4f(position.xyz, f32(at.y * size.x + at.x));
+        }
+    }
+    return vec4f(vec3f(0.0), -1.0);
+}
+
+fn from_splat(splat: Splat, x: vec3f, reach: f32) -> vec3f {
+    var sum = vec3f(0.0);
+    var disks = splat.disks;
+    for (var d = 0; d < 4; d++) {
+        let disk = disks[d];
+        if disk.w == 0.0 {
             break;
         }
-    }
-    var sum = vec3f(0.0);
-    if index >= 0.0 {
-        let reach = kernel_reach();
-        for (var k = 0u; k < arrayLength(&splats); k++) {
-            for (var d = 0; d < 4; d++) {
-                let disk = splats[k].disks[d];
-                if disk.w == 0.0 {
-                    break;
-                }
-                let offset = found.xyz - disk.xyz;
-                let radius = sqrt(disk.w / PI);
-                if dot(offset, offset) < (reach + radius) * (reach + radius) {
-                    sum += disk.w * splats[k].light * disk_mean_across(offset, splats[k].normal, radius);
-                }
-            }
+        let offset = x - disk.xyz;
+        let radius = sqrt(disk.w / PI);
+        if dot(offset, offset) < (reach + radius) * (reach + radius) {
+            sum += disk.w * splat.light * disk_mean_across(offset, splat.normal, radius);
         }
     }
-    blocks[i] = vec4f(sum, index);
+    return sum;
+}
+
+@compute @workgroup_size(64)
+fn compute(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+    let block = element_of_group(group);
+    if block >= arrayLength(&blocks) {
+        return;
+    }
+    if lane == 0u {
+        receiver = find_receiver(block);
+    }
+    let found = workgroupUniformLoad(&receiver);
+    if found.w < 0.0 {
+        if lane == 0u {
+            blocks[block] = vec4f(vec3f(0.0), -1.0);
+        }
+        return;
+    }
+    let reach = kernel_reach();
+    var sum = vec3f(0.0);
+    for (var k = lane; k < arrayLength(&splats); k += LANES) {
+        sum += from_splat(splats[k], found.xyz, reach);
+    }
+    sums[lane] = sum;
+    for (var half = LANES / 2u; half > 0u; half /= 2u) {
+        workgroupBarrier();
+        if lane < half {
+            sums[lane] += sums[lane + half];
+        }
+    }
+    if lane == 0u {
+        blocks[block] = vec4f(sums[0], found.w);
+    }
 }

@@ -20,12 +20,17 @@
 //! Claims: pictures close to a traced one at any scattering distance and for any lights, for meshes that deform as they
 //! like: nothing is baked but which triangles make a patch.
 //!
-//! Costs: `ScreenSpace`, and `splats` samples for one pixel in sixteen. Sixteen lights cost hardly more than one, since
-//! light is looked up once per pixel and patch.
+//! Costs: `ScreenSpace`, and `splats` samples for one pixel in sixteen, which is about as much again. Light is gathered once,
+//! whatever the number of lights, but each brings its shadow maps and is looked up at each pixel and piece of a patch:
+//! sixteen lamps around a knot (`scenes/long-range/lamps.ron`) cost two to four times as much as one with 96 x 72 pixels, and
+//! a half more with 192 x 144: shadow maps do not grow with the picture.
 //!
 //! Fails where the profile does: light is taken to cross the inside of things as if they were flat and endless, so thin
 //! parts come out too dark, and hollow ones glow. `scenes/long-range/back-lit.ron` shows it against `volume`. Shadows that
-//! are seen through a thing are as coarse as its patches. So near to a surface that one patch fills the picture, it comes
+//! are seen through a thing are as coarse as its patches. Where one strand of a thing passes before another, cells of the
+//! screen part hold both: `scenes/long-range/mixed.ron` comes out 5 % too dark, and `n_l: 8, layers: 24`, for three times the
+//! samples there, takes a third of its relMSE away. Of figures of few pixels the edges are most of the error: that takes more
+//! samples per pixel. So near to a surface that one patch fills the picture, it comes
 //! out a tenth too bright or too dark, at a fiftieth of a ball's radius a fifth.
 //!
 //! ```
@@ -136,7 +141,8 @@ fn far(
         shader: surface.shader("techniques/long_range/far.wgsl", &[])?,
         output: ("blocks", 16),
         count: Count::Known(blocks),
-        dispatches: vec![Dispatch { count: blocks, binds: Vec::new() }],
+        // A workgroup each.
+        dispatches: vec![Dispatch { count: 64 * blocks, binds: Vec::new() }],
         binds,
     })))
 }

@@ -102,10 +102,17 @@ fn groups(mesh: &Mesh, wanted: u32) -> (Vec<u32>, u32) {
     let steps = GRID / (high - low).max_element();
     let on_grid: Vec<Vec3> = mesh.positions.iter().map(|p| ((p.as_dvec3() - low) * steps).round().as_vec3()).collect();
     let positions: Vec<[f32; 3]> = on_grid.iter().map(|p| p.to_array()).collect();
-    let options = SimplifyOptions::Regularize | SimplifyOptions::Prune;
     // Of what has fewer triangles than are wanted all stay.
     let target = indices.len().min(3 * wanted as usize);
-    let coarse = meshopt::simplify_decoder(&indices, &positions, target, 1.0, options, None);
+    let decimated = |options| meshopt::simplify_decoder(&indices, &positions, target, 1.0, options, None);
+    let mut coarse = decimated(SimplifyOptions::Regularize);
+    if coarse.len() > 2 * target {
+        // Many small parts, of which some may go. Of a single one hardly anything would be left.
+        let pruned = decimated(SimplifyOptions::Regularize | SimplifyOptions::Prune);
+        if 2 * pruned.len() > target {
+            coarse = pruned;
+        }
+    }
     let triangles: Vec<[u32; 3]> = coarse.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
     let coarse = Mesh { positions: on_grid.clone(), triangles, ..Mesh::default() };
     let nearest = Nearest::new(&coarse);
@@ -257,6 +264,12 @@ mod tests {
                 }
             }
             assert_eq!(cut(&mesh, 500), patches);
+        }
+        let knot = shapes::torus_knot(2, 3, 1.5, 0.55, (240, 40));
+        for wanted in [100, 300, 500, 2000] {
+            let count = cut(&knot, wanted).starts.len() - 1;
+            println!("{count} patches for {wanted}");
+            assert!(count > wanted as usize / 2, "{count} patches for {wanted}");
         }
         let mut needle = shapes::sphere(1.0, 3);
         needle.positions.iter_mut().for_each(|p| *p *= Vec3::new(1e-6, 1.0, 1e-6));
