@@ -404,14 +404,23 @@ fn an_edit_of_a_map_or_a_layer_bakes_nothing() {
             "{made:?}"
         );
     }
-    // What layers send back is one bake, which coefficients and depths do not touch, but phase functions do.
+    // What layers send back is baked for each boundary and each phase function: coefficients and depths do not touch it, and
+    // one phase function not what was baked for others.
     let often = slab(ABOVE, SUN, "Layered(multiple: true)");
     let before = plan(&layers, &often);
-    assert!(before.steps().iter().any(|step| step.name == "layered.returns"));
+    let baked = |made: &BTreeMap<&'static str, usize>| {
+        ["layered.diffusion", "layered.once"].map(|name| made.get(name).copied())
+    };
+    assert_eq!(baked(&anew(&Plan::default(), &before)), [Some(1), Some(2)]);
     let changed = anew(&before, &plan(&[(thicker, "0.2".into())], &often));
-    assert!(!changed.contains_key("layered.returns") && changed.contains_key("technique.layered"), "{changed:?}");
+    assert!(baked(&changed) == [None, None] && changed.contains_key("technique.layered"), "{changed:?}");
+    assert!(!changed.contains_key("layered.returns"), "{changed:?}");
     let turned = Medium { parameter: 0.3, ..SKIN };
-    assert!(anew(&before, &plan(&[(turned, map("R"))], &often)).contains_key("layered.returns"));
+    assert_eq!(baked(&anew(&before, &plan(&[(turned, map("R"))], &often))), [None, Some(1)]);
+    studio.write("other.ron", material(1.33, &constant(&[(turned, 0.2)]), FLESH));
+    let two = often.replace("objects: [", "objects: [(mesh: Sphere(radius: 1), material: \"other.ron\"), ");
+    assert_ne!(two, often);
+    assert_eq!(baked(&anew(&before, &plan(&layers, &two))), [None, Some(1)]);
     // Without images nothing of a map is planned.
     let plain = plan(&constant(&[(SKIN, 0.4)]), &scene);
     assert!(plain.steps().iter().all(|step| !["layered.maps", "layered.slopes"].contains(&step.name)));
