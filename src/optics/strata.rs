@@ -291,7 +291,7 @@ mod tests {
                         by_diffusion - by_one
                     );
                     // Light that grazes and goes on comes back in ways that no mean cosine tells.
-                    let bound = if cos == 0.1 { 0.12 } else { 0.045 };
+                    let bound = if cos == 0.1 { 0.15 } else { 0.045 };
                     assert!(
                         (found - truth).abs() < bound,
                         "index {ior}, cosine {cos}, g {g}, {alpha}: {found} {truth}"
