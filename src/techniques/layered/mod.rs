@@ -26,8 +26,8 @@
 //! `multiple: true` has diffusion go up and down in the layers as they are where light enters, as if they were as deep
 //! everywhere: from the deepest one upwards each adds, in closed form, what it sends back and what it lets through. So a
 //! texel has an effective medium, and for a half space the result is corrected to be exact. Light that scattered once is in
-//! it, and its share is taken out again. Such light leaves where it entered, in each direction as it would be returned from there, so
-//! that what is white and evenly lit is evenly bright; of maps it knows the mean over a mean free path.
+//! it, and its share is taken out again. Such light leaves where it entered, in each direction as it would be returned from
+//! there, so that what is white and evenly lit is evenly bright; of maps it knows the mean over a mean free path.
 //!
 //! Fails without `multiple` where light scatters more often than once, which is most of it in skin or marble: such things
 //! come out too dark. `scenes/bench/whisper.ron` shows it. With it, where light goes farther to the side than shadows and
