@@ -355,6 +355,68 @@ fn white_layers_send_back_all_that_an_even_sky_sends() {
     assert!(error(&image, ABOVE, |view| DVec3::splat(1.0 - fresnel_dielectric(-view.y, 1.4))) > 0.15);
 }
 
+#[test]
+fn what_scatters_often_has_lost_light_twice_or_more() {
+    let mut studio = studio();
+    // Grazed, where diffusion by the mean cosine alone is most wrong: what scatters back, and what scatters on.
+    let eye = dvec3(0.0, 0.6, 4.0);
+    for (albedo, parameter) in [(0.2, -0.9), (0.5, -0.9), (0.2, 0.9), (0.5, 0.9)] {
+        studio.write("thing.ron", material(1.0, &[], Medium { parameter, ..grey(1.0 - albedo, albedo) }));
+        let all = studio.scattered(&slab(eye, "Environment(radiance: 1)", "Layered(multiple: true)"));
+        let once = studio.scattered(&slab(eye, "Environment(radiance: 1)", "Layered()"));
+        let often = zip(&all, &once, |a, b| a - b);
+        let most = often.iter().flatten().fold(0f32, |most, value| most.max(*value));
+        let least = often.iter().flatten().fold(f32::INFINITY, |least, value| least.min(*value));
+        assert!(f64::from(most) < albedo * albedo, "albedo {albedo}, {parameter}: {most}");
+        assert!(least >= 0.0 && most > 0.0, "albedo {albedo}, {parameter}: {least} to {most}");
+    }
+}
+
+#[test]
+fn the_reference_of_layers_sees_a_lamp_from_the_eye_as_the_eye_from_the_lamp() {
+    let mut studio = studio();
+    studio.write("thing.ron", material(1.0, &constant(&[(SKIN, 0.2), (FLESH, 0.5)]), SKIN));
+    let (one, other) = (dvec3(0.2, 0.4, 0.9).normalize(), dvec3(-0.3, 1.0, 0.1).normalize());
+    for integrator in ["Layered", "Volume"] {
+        let technique = format!("Reference(integrator: {integrator}, light: Direct, max_error: 1e-6, max_spp: 64)");
+        // Of all places the same: so many more samples.
+        let mut seen = |to_eye: DVec3, to_light: DVec3| {
+            let [x, y, z] = (-to_light).to_array();
+            let light = format!("Directional(direction: ({x:?}, {y:?}, {z:?}), irradiance: 1, shadow: false)");
+            let scene = slab(60.0 * to_eye, &light, &technique).replace("fov_y_deg: 50.0", "fov_y_deg: 1.0");
+            mean(&studio.scattered(&scene))
+        };
+        let (there, back) = (seen(one, other), seen(other, one));
+        let off = (there / other.y) / (back / one.y) - 1.0;
+        assert!(off.abs() < 0.05, "{integrator}: {there} {back} {off}");
+        assert!((there / back - 1.0).abs() > 0.2, "the two directions are too much alike to tell");
+    }
+}
+
+#[test]
+fn layers_of_constant_depth_need_no_texture_coordinates() {
+    let mut studio = studio();
+    studio.write("thing.ron", material(1.33, &constant(&[(SKIN, 0.2)]), FLESH));
+    let corners = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n";
+    let faces = [[4, 3, 2, 1], [5, 6, 7, 8], [1, 2, 6, 5], [3, 4, 8, 7], [2, 3, 7, 6], [4, 1, 5, 8]];
+    let mut boxed = |mapped: bool| {
+        let corner = |i: &i32| if mapped { format!(" {i}/{i}") } else { format!(" {i}") };
+        let face = |face: &[i32; 4]| format!("f{}\n", face.iter().map(corner).collect::<String>());
+        let uvs: String =
+            (0..8).map(|i| format!("vt {:?} {:?}\n", f64::from(i) / 8.0, f64::from(i % 3) / 3.0)).collect();
+        let uvs = if mapped { uvs } else { String::new() };
+        studio.write("box.obj", format!("{corners}{uvs}{}", faces.iter().map(face).collect::<String>()));
+        studio.scattered(&format!(
+            r#"mm_per_unit: 10, camera: (eye: (2, 3, 5), target: (0, 0, 0), fov_y_deg: 36), lights: [{SUN}],
+            objects: [(mesh: File("box.obj"), material: "thing.ron")],
+            view: (technique: Layered(multiple: true), size: {SIZE:?}, antialias: 1)"#
+        ))
+    };
+    let (without, with) = (boxed(false), boxed(true));
+    assert!(mean(&without) > 1e-3);
+    assert!(most_apart(&without, &with) < 1e-6);
+}
+
 fn zip(a: &Image, b: &Image, f: fn(f32, f32) -> f32) -> Vec<[f32; 3]> {
     a.pixels.iter().zip(&b.pixels).map(|(a, b)| std::array::from_fn(|c| f(a[c], b[c]))).collect()
 }
@@ -404,14 +466,23 @@ fn an_edit_of_a_map_or_a_layer_bakes_nothing() {
             "{made:?}"
         );
     }
-    // What layers send back is one bake, which coefficients and depths do not touch, but phase functions do.
+    // What layers send back is baked for each boundary and each phase function: coefficients and depths do not touch it, and
+    // one phase function not what was baked for others.
     let often = slab(ABOVE, SUN, "Layered(multiple: true)");
     let before = plan(&layers, &often);
-    assert!(before.steps().iter().any(|step| step.name == "layered.returns"));
+    let baked = |made: &BTreeMap<&'static str, usize>| {
+        ["layered.diffusion", "layered.once"].map(|name| made.get(name).copied())
+    };
+    assert_eq!(baked(&anew(&Plan::default(), &before)), [Some(1), Some(2)]);
     let changed = anew(&before, &plan(&[(thicker, "0.2".into())], &often));
-    assert!(!changed.contains_key("layered.returns") && changed.contains_key("technique.layered"), "{changed:?}");
+    assert!(baked(&changed) == [None, None] && changed.contains_key("technique.layered"), "{changed:?}");
+    assert!(!changed.contains_key("layered.returns"), "{changed:?}");
     let turned = Medium { parameter: 0.3, ..SKIN };
-    assert!(anew(&before, &plan(&[(turned, map("R"))], &often)).contains_key("layered.returns"));
+    assert_eq!(baked(&anew(&before, &plan(&[(turned, map("R"))], &often))), [None, Some(1)]);
+    studio.write("other.ron", material(1.33, &constant(&[(turned, 0.2)]), FLESH));
+    let two = often.replace("objects: [", "objects: [(mesh: Sphere(radius: 1), material: \"other.ron\"), ");
+    assert_ne!(two, often);
+    assert_eq!(baked(&anew(&before, &plan(&layers, &two))), [None, Some(1)]);
     // Without images nothing of a map is planned.
     let plain = plan(&constant(&[(SKIN, 0.4)]), &scene);
     assert!(plain.steps().iter().all(|step| !["layered.maps", "layered.slopes"].contains(&step.name)));

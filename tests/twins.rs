@@ -185,6 +185,16 @@ fn twins() -> Vec<Twin> {
             floor: 0.01,
             mistake: ("own - q", "q - own"),
         },
+        Twin {
+            stem: "strata",
+            name: "often",
+            axes: vec![vec![0.0, 0.1, 1.0], vec![0.0, 1e-3, 0.3], vec![0.0, 0.1, 0.6], vec![1e-6, 0.1, 1.0]],
+            rust: Box::new(|a| vec![strata::often(a[0], a[1], a[2], a[3])]),
+            results: 1,
+            tolerance: 1e-5,
+            floor: 1e-3,
+            mistake: ("1.0 - once_white", "1.0 + once_white"),
+        },
     ]
 }
 

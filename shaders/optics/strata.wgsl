@@ -34,3 +34,10 @@ fn on_top(sigma_a: f32, sigma_s_prime: f32, thickness: f32, cos: f32, q: f32, re
     let through = exp(-down - k) * (1.0 + reflected) / at_top;
     return array<f32, 2>(own * (1.0 - there_and_back) / at_top, within + through * returned);
 }
+
+// Of light that comes back, `all` by diffusion, the share that was scattered more than once: `once` comes back after one
+// event, and `once_white` would without absorption.
+fn often(all: f32, once: f32, once_white: f32, survival: f32) -> f32 {
+    let more = (1.0 - once_white) * survival;
+    return all * more / (once + more);
+}

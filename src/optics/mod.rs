@@ -51,7 +51,10 @@ mod tests {
         for (source, functions) in [
             (include_str!("../../shaders/optics/fresnel.wgsl"), &["fresnel_dielectric"][..]),
             (include_str!("../../shaders/optics/microfacet.wgsl"), &["ggx_d", "smith_g2", "ggx_lobe"]),
-            (include_str!("../../shaders/optics/strata.wgsl"), &["admittance", "mean_exp", "below_all", "on_top"]),
+            (
+                include_str!("../../shaders/optics/strata.wgsl"),
+                &["admittance", "mean_exp", "below_all", "on_top", "often"],
+            ),
             (include_str!("../../shaders/optics/sh.wgsl"), &["sh_basis_3", "sh_basis_8"]),
         ] {
             let module = validate(source).unwrap_or_else(|e| panic!("{e}"));

@@ -1,5 +1,5 @@
-// Light that scatters more than once below a place and leaves there: what the layers send back by diffusion, less what
-// `single` says that they send back after one event. Both take the layers for as deep everywhere as they are there.
+// Light that scatters more than once below a place and leaves there: a share of what the layers send back by diffusion, by
+// what `single` says that they send back after one event. Both take the layers for as deep everywhere as they are there.
 
 #include "optics/fresnel.wgsl"
 #include "optics/strata.wgsl"
@@ -25,22 +25,20 @@ struct Body {
 // As `strata`.
 @group(0) @binding(11) var<storage, read> reduced: array<Reduced>;
 @group(0) @binding(12) var<storage, read> bodies: array<Body>;
-// For each thing: corrections of diffusion (r), by admittance and by the cosine outside; then, for each of its strata and by
-// that cosine, what comes back after one event without absorption.
+// For each thing: corrections of diffusion (r) and the root of what survives (g), by admittance and by the cosine outside;
+// then, for each of its strata and by that cosine, what comes back after one event without absorption.
 @group(0) @binding(13) var<storage, read> returns: array<vec4f>;
 
-fn correction(body: Body, q: f32, cos: f32) -> f32 {
+// What scattered more than once of all that comes back by diffusion.
+fn corrected(body: Body, cos: f32, q: f32, diffused: f32, once: f32, once_white: f32) -> f32 {
     let at = saturate(vec2f(q, cos)) * f32(body.knots - 1u);
     let low = min(vec2u(at), vec2u(body.knots - 2u));
     let share = at - vec2f(low);
     let i = body.returns + low.x * body.knots + low.y;
-    let clearer = mix(returns[i].r, returns[i + 1u].r, share.y);
-    let darker = mix(returns[i + body.knots].r, returns[i + body.knots + 1u].r, share.y);
-    return mix(clearer, darker, share.x);
-}
-
-fn corrections(body: Body, q: vec3f, cos: f32) -> vec3f {
-    return vec3f(correction(body, q.r, cos), correction(body, q.g, cos), correction(body, q.b, cos));
+    let clearer = mix(returns[i].rg, returns[i + 1u].rg, share.y);
+    let darker = mix(returns[i + body.knots].rg, returns[i + body.knots + 1u].rg, share.y);
+    let both = mix(clearer, darker, share.x);
+    return often(both.x * diffused, once, once_white, both.y * both.y);
 }
 
 // The admittance of all from a layer on downwards, and what diffuses up from there, in each channel.
@@ -53,13 +51,14 @@ fn level(r: array<f32, 2>, g: array<f32, 2>, b: array<f32, 2>) -> Level {
     return Level(vec3f(r[0], g[0], b[0]), vec3f(r[1], g[1], b[1]));
 }
 
-// What one stratum alone sends back after one event.
-fn single(ray: Ray, body: Body, j: u32, cos: f32) -> vec3f {
+// What one stratum alone sends back after one event, and what it would without absorption.
+fn single(ray: Ray, body: Body, j: u32, cos: f32) -> mat2x3f {
     let at = saturate(cos) * f32(body.knots - 1u);
     let low = min(u32(at), body.knots - 2u);
     let i = body.returns + (body.knots + j) * body.knots + low;
     let stratum = strata[ray.stack.first + j];
-    return stratum.sigma_s / max(stratum.sigma_t, vec3f(1e-30)) * mix(returns[i].rgb, returns[i + 1u].rgb, at - f32(low));
+    let white = mix(returns[i].rgb, returns[i + 1u].rgb, at - f32(low));
+    return mat2x3f(stratum.sigma_s / max(stratum.sigma_t, vec3f(1e-30)) * white, white);
 }
 
 // The cosine below a surface.
@@ -99,10 +98,15 @@ fn returned_often(ray: Ray, body: Body, cos: f32) -> vec3f {
             on_top(a.b, s.b, thickness, down, up.q.b, up.diffused.b)
         );
         let below = exp(-slant * thickness * strata[ray.stack.first + j].sigma_t);
-        once = mix(single(ray, body, j, cos), once, below);
+        let here = single(ray, body, j, cos);
+        once = mat2x3f(mix(here[0], once[0], below), mix(here[1], once[1], below));
     }
-    let all = corrections(body, up.q, cos) * up.diffused / (1.0 + body.boundary * up.q);
-    return max(vec3f(0.0), all - once);
+    let all = up.diffused / (1.0 + body.boundary * up.q);
+    return vec3f(
+        corrected(body, cos, up.q.r, all.r, once[0].r, once[1].r),
+        corrected(body, cos, up.q.g, all.g, once[0].g, once[1].g),
+        corrected(body, cos, up.q.b, all.b, once[0].b, once[1].b)
+    );
 }
 
 // How far light gets to the side before it scatters, in the mean along the ray: so wide a piece of the map is one.
@@ -162,5 +166,7 @@ fn scattered_often(ray: Ray, body: Body, pixel: vec2i) -> vec3f {
             shone += enters * light * returned;
         }
     }
-    return body.spread * shone * leaves / max(vec3f(1e-20), everywhere / entered);
+    let mean = everywhere / entered;
+    // Where nothing comes back from anywhere, nothing leaves. A comparison lets through what is no number; max would not.
+    return body.spread * shone * leaves / select(mean, vec3f(1e-20), mean < vec3f(1e-20));
 }

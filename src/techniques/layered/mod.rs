@@ -26,8 +26,8 @@
 //! `multiple: true` has diffusion go up and down in the layers as they are where light enters, as if they were as deep
 //! everywhere: from the deepest one upwards each adds, in closed form, what it sends back and what it lets through. So a
 //! texel has an effective medium, and for a half space the result is corrected to be exact. Light that scattered once is in
-//! it, and is taken out again. Such light leaves where it entered, in each direction as it would be returned from there, so
-//! that what is white and evenly lit is evenly bright; of maps it knows the mean over a mean free path.
+//! it, and its share is taken out again. Such light leaves where it entered, in each direction as it would be returned from
+//! there, so that what is white and evenly lit is evenly bright; of maps it knows the mean over a mean free path.
 //!
 //! Fails without `multiple` where light scatters more often than once, which is most of it in skin or marble: such things
 //! come out too dark. `scenes/bench/whisper.ron` shows it. With it, where light goes farther to the side than shadows and
@@ -164,7 +164,7 @@ impl Technique for Layered {
             };
             strata.extend(strata_of(member.material, surface.mm_per_unit()));
             if let Some(often) = &mut often {
-                often.add(&member, self.refract, surface.mm_per_unit());
+                often.add(plan, &member, self.refract, surface.mm_per_unit());
             }
         }
         let mut flags = Vec::new();
@@ -193,7 +193,7 @@ impl Technique for Layered {
         }
         if let Some(often) = often {
             flags.push("MULTIPLE");
-            binds.extend(often.binds(plan, surface));
+            binds.extend(often.binds(plan));
         }
         let maps = maps.upload(plan);
         if let Some(maps) = maps {

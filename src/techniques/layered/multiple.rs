@@ -1,13 +1,14 @@
 //! Light that scatters more than once below layers: what the device needs to know of each thing.
 
 use super::media;
-use crate::frame::{Member, Surface};
-use crate::gpu::Bind;
+use crate::frame::Member;
+use crate::gpu::{Bind, Buffer, Gpu};
 use crate::optics::fresnel::diffuse_transmittance;
+use crate::optics::medium::Medium;
 use crate::optics::phase::Phase;
-use crate::optics::strata::{boundary, correction, single};
+use crate::optics::strata::{boundary, correction, single, survival};
 use crate::problem::Problem;
-use crate::store::{Bake, Plan, Run, Step};
+use crate::store::{Bake, Plan, Run, Slot, Step};
 use crate::uniform;
 use glam::Vec3;
 use serde::Serialize;
@@ -47,14 +48,17 @@ impl Multiple {
     }
 
     /// Members come in the order of their strata.
-    pub fn add(&mut self, member: &Member, refract: bool, mm_per_unit: f64) {
+    pub fn add(&mut self, plan: &mut Plan, member: &Member, refract: bool, mm_per_unit: f64) {
         let ior = member.material.surface.ior;
         let bend = if refract { ior } else { 1.0 };
-        let phases = media(member.material)
-            .map(|(medium, phase)| (phase, medium.g.to_array().map(|g| phase.parameter(g))))
-            .collect();
+        let once = |(medium, phase): (&Medium, Phase)| {
+            let parameters = medium.g.to_array().map(|g| phase.parameter(g));
+            plan.bake(Once { ior, bend, phase, parameters })
+        };
+        let once = media(member.material).map(once).collect();
+        let table = Table { diffusion: plan.bake(Diffusion { ior }), once };
         self.bodies[member.place()] = Body {
-            returns: self.returns.add(Table { ior, bend, phases }) as u32,
+            returns: self.returns.add(table) as u32,
             knots: KNOTS as u32,
             boundary: boundary(ior) as f32,
             spread: (1.0 / (PI * diffuse_transmittance(ior))) as f32,
@@ -65,36 +69,103 @@ impl Multiple {
         }));
     }
 
-    pub fn binds(self, plan: &mut Plan, surface: &Surface) -> Vec<(&'static str, Bind)> {
-        let returns = plan.bake(self.returns);
+    pub fn binds(self, plan: &mut Plan) -> Vec<(&'static str, Bind)> {
         vec![
             ("reduced", Bind::list(&self.reduced)),
             ("bodies", Bind::list(&self.bodies)),
-            ("returns", Bind::Buffer(surface.upload_list(plan, returns, "what layers send back"))),
+            ("returns", Bind::Buffer(plan.add(self.returns))),
         ]
     }
 }
 
-/// Corrections of diffusion (the first number), by admittance and by the cosine outside, and, for each stratum and by that
-/// cosine, what half spaces of it send back after one event without absorption. Knows neither coefficients nor depths.
-#[derive(Serialize)]
-struct Returns {
-    tables: Vec<Table>,
+type Rows = Vec<[f32; 4]>;
+
+/// The cosines outside, and the admittances, of a table.
+fn knots() -> [f64; KNOTS] {
+    std::array::from_fn(|i| i as f64 / (KNOTS - 1) as f64)
 }
 
-#[derive(PartialEq, Serialize)]
-struct Table {
+/// What is known of half spaces below a boundary, whatever they hold: by admittance and by the cosine outside, the
+/// correction of diffusion and the root of what survives more than one event. As a root that is nearly straight.
+#[derive(Serialize)]
+struct Diffusion {
+    ior: f64,
+}
+
+impl Step for Diffusion {
+    type Output = Rows;
+    fn name(&self) -> &'static str {
+        "layered.diffusion"
+    }
+    fn about(&self) -> String {
+        format!("how much light half spaces of index {} send back", self.ior)
+    }
+    fn run(&self, run: &Run) -> Result<Rows, Problem> {
+        let mut rows = Vec::new();
+        for q in knots() {
+            run.tick(q)?;
+            let both = correction(q, self.ior, &knots()).into_iter().zip(survival(q, self.ior, &knots()));
+            rows.extend(both.map(|(correction, survival)| [correction as f32, survival.sqrt() as f32, 0.0, 0.0]));
+        }
+        Ok(rows)
+    }
+}
+
+impl Bake for Diffusion {
+    const CODE: &'static [&'static str] = &["src/optics/", "src/techniques/layered/multiple.rs"];
+}
+
+/// By the cosine outside, what half spaces with this phase function send back after one event without absorption. Knows
+/// neither coefficients nor depths.
+#[derive(Serialize)]
+struct Once {
     ior: f64,
     /// The index by which rays are bent.
     bend: f64,
-    /// Each stratum's function, and its parameters.
-    phases: Vec<(Phase, [f64; 3])>,
+    phase: Phase,
+    /// For each channel.
+    parameters: [f64; 3],
+}
+
+impl Step for Once {
+    type Output = Rows;
+    fn name(&self) -> &'static str {
+        "layered.once"
+    }
+    fn about(&self) -> String {
+        "how much light comes back after one event".into()
+    }
+    fn run(&self, run: &Run) -> Result<Rows, Problem> {
+        let row = |cos: f64| {
+            run.tick(cos)?;
+            let [r, g, b] = self.parameters.map(|k| single(self.phase, k, self.ior, self.bend, cos) as f32);
+            Ok([r, g, b, 0.0])
+        };
+        knots().map(row).into_iter().collect()
+    }
+}
+
+impl Bake for Once {
+    const CODE: &'static [&'static str] = &["src/optics/", "src/techniques/layered/multiple.rs"];
+}
+
+/// What a thing's layers send back: diffusion's rows, then each stratum's own.
+#[derive(PartialEq, Serialize)]
+struct Table {
+    diffusion: Slot<Rows>,
+    once: Vec<Slot<Rows>>,
 }
 
 impl Table {
     fn len(&self) -> usize {
-        KNOTS * (KNOTS + self.phases.len())
+        KNOTS * (KNOTS + self.once.len())
     }
+}
+
+/// All tables of a picture, one after the other, on the device.
+#[derive(Serialize)]
+struct Returns {
+    tables: Vec<Table>,
 }
 
 impl Returns {
@@ -109,34 +180,17 @@ impl Returns {
 }
 
 impl Step for Returns {
-    type Output = Vec<[f32; 4]>;
+    type Output = Buffer;
     fn name(&self) -> &'static str {
         "layered.returns"
     }
     fn about(&self) -> String {
-        "how much light half spaces send back".into()
+        "how much light layers send back, to the device".into()
     }
-    fn run(&self, run: &Run) -> Result<Vec<[f32; 4]>, Problem> {
-        let knots: [f64; KNOTS] = std::array::from_fn(|i| i as f64 / (KNOTS - 1) as f64);
-        let mut rows = Vec::new();
-        for table in &self.tables {
-            for q in knots {
-                run.tick(rows.len() as f64 / self.tables.iter().map(Table::len).sum::<usize>() as f64)?;
-                let corrections = correction(q, table.ior, &knots);
-                rows.extend(corrections.iter().map(|value| [*value as f32, 0.0, 0.0, 0.0]));
-            }
-            for (phase, parameters) in &table.phases {
-                for cos in knots {
-                    let share = |k: f64| single(*phase, k, table.ior, table.bend, cos) as f32;
-                    let [r, g, b] = parameters.map(share);
-                    rows.push([r, g, b, 0.0]);
-                }
-            }
-        }
-        Ok(rows)
+    fn run(&self, run: &Run) -> Result<Buffer, Problem> {
+        let slots =
+            self.tables.iter().flat_map(|table| [table.diffusion].into_iter().chain(table.once.iter().copied()));
+        let rows: Rows = slots.flat_map(|slot| run.get(slot).to_vec()).collect();
+        Ok(Buffer::new(run.host::<Gpu>(), bytemuck::cast_slice(&rows)))
     }
-}
-
-impl Bake for Returns {
-    const CODE: &'static [&'static str] = &["src/optics/", "src/techniques/layered/multiple.rs"];
 }
