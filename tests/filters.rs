@@ -4,7 +4,7 @@ mod studio;
 
 use diaphane::image::Image;
 use std::sync::Arc;
-use studio::{Studio, mean, most_apart, studio};
+use studio::{Studio, mean, most_apart, share_apart, studio};
 
 const SUN: &str = "Directional(direction: (-1, -0.5, -1), irradiance: 3, shadow: false)";
 const SKY: &str = "Environment(radiance: 1)";
@@ -121,4 +121,26 @@ fn light_spreads_over_the_edge_of_a_shadow_and_none_is_lost() {
     assert!(even[24..40].iter().zip(&flat[24..40]).all(|(a, b)| (a / b - 1.0).abs() < 0.01));
     let sum = |row: &[f64]| row.iter().sum::<f64>();
     assert!((sum(&soft) / sum(&sharp) - 1.0).abs() < 0.15, "{} {}", sum(&soft), sum(&sharp));
+}
+
+/// Shadows are looked up above the surface: along the normals of triangles that would cut each edge into teeth.
+#[test]
+fn triangles_are_not_seen_at_the_edge_of_a_shadow() {
+    let mut studio = studio();
+    wax(&studio, "Gaussian(width: 6)");
+    let mut shaded = |subdivisions: u32| {
+        studio.scattered(&format!(
+            "mm_per_unit: 10, camera: (eye: (0, 0, 20), target: (0, 0, 0), fov_y_deg: 6), lights: [
+                Directional(direction: (0.3, -0.5, -1), irradiance: 3)],
+             objects: [
+                (name: \"ball\", mesh: Sphere(radius: 2, subdivisions: {subdivisions}), material: \"wax.ron\"),
+                (name: \"bar\", mesh: Box(size: (20, 0.6, 0.6)), material: \"wax.ron\",
+                 transform: (translate: (-0.9, 1.7, 5), rotate_deg: (0, 0, 10)))],
+             view: (technique: FilteredNormals(), size: (96, 96), antialias: 1)"
+        ))
+    };
+    let [coarse, fine] = [4, 6].map(&mut shaded);
+    let apart = share_apart(&coarse, &fine, 0.25 * mean(&fine));
+    println!("{apart:.4} of the pixels are apart");
+    assert!(apart < 0.01, "{apart}");
 }
