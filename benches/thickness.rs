@@ -1,8 +1,9 @@
 //! What thickness costs and what it is worth: `cargo bench --bench thickness -- rays` compares the sweeps that bake lengths with
 //! a traversal of a hierarchy of boxes, and `-- pictures` draws a figure lit from three sides by each method, measures it
 //! against the truth with the brightness of all pictures made alike, as [Tomaszewska2012, fig. 4] does with observers, and
-//! writes `docs/thickness.png`. Truths are those of `diaphane bench scenes/bench/thickness-*.ron`, which takes the times, and
-//! whoever of the two comes second finds them made.
+//! writes `docs/thickness.png`. Truths are those of `diaphane bench scenes/bench/thickness-*.ron`, which takes the times:
+//! whoever of the two comes second finds them made, and so does who was interrupted. They take most of the time, some minutes
+//! for each side; `-- pictures 128` makes do with 128 paths per pixel.
 
 use diaphane::bench::errors;
 use diaphane::geometry::{sculpture, thickness};
@@ -29,7 +30,8 @@ fn main() {
         rays();
     }
     if asked("pictures") || neither {
-        pictures();
+        let paths = words.iter().find_map(|word| word.parse().ok()).unwrap_or(MAX_SAMPLES);
+        pictures(paths.max(MIN_SAMPLES));
     }
 }
 
@@ -109,6 +111,7 @@ const SIDES: [&str; 3] = ["back", "front", "left"];
 /// As `scenes/bench/thickness-*.bench.ron` have it.
 const SIZE: (u32, u32) = (80, 128);
 const AT_MOST: f64 = 0.02;
+const MIN_SAMPLES: u64 = 64;
 const MAX_SAMPLES: u64 = 1024;
 /// How many pixels of the sheet show one of a picture, along each side.
 const SHOWN: u32 = 2;
@@ -140,10 +143,10 @@ impl Studio {
         look
     }
 
-    fn truth(&mut self, scene: &Scene) -> Truthful {
+    fn truth(&mut self, scene: &Scene, max_samples: u64) -> Truthful {
         let view = Studio::look(scene, "Opaque()").view;
         let settings = errors::settings(Truth::Volume, scene, &view);
-        let goal = Goal::Error { part: errors::PART, at_most: AT_MOST, min_samples: 64, max_samples: MAX_SAMPLES };
+        let goal = Goal::Error { part: errors::PART, at_most: AT_MOST, min_samples: MIN_SAMPLES, max_samples };
         let film = self.session.trace(scene, &settings, &goal, &self.told, |film| {
             eprintln!("  {}", film.level(errors::PART));
         });
@@ -184,7 +187,7 @@ impl Truthful {
     }
 }
 
-fn pictures() {
+fn pictures(max_samples: u64) {
     let options = Options { cache_dir: std::env::var_os("DIAPHANE_CACHE").map(Into::into), ..Options::default() };
     let mut studio = Studio { session: Session::new(options), told: Told::default() };
     let mut rows: Vec<Vec<Image>> = Vec::new();
@@ -193,7 +196,7 @@ fn pictures() {
         let path = format!("scenes/bench/thickness-{side}.ron");
         println!("\n{path}");
         let scene = studio.session.scene(Path::new(&path)).unwrap_or_else(|problems| panic!("{problems}")).0;
-        let truth = studio.truth(&scene);
+        let truth = studio.truth(&scene, max_samples);
         let mut measure = |technique: &str| {
             let picture = studio.picture(&scene, technique);
             let (shown, factor) = truth.alike(&picture);

@@ -79,7 +79,7 @@ fn scene(folder: &Path, thousands: usize, mesh: &Mesh, row: usize) -> PathBuf {
              lights: [Directional(direction: (-1, -0.6, -0.7), irradiance: 3), Environment(radiance: 0.1)],
              objects: [(name: \"knot\", mesh: File(\"knot-{thousands}.obj\"), material: \"knot-{row}.material.ron\",
                         normals: Smooth(crease_deg: 180))],
-             view: (size: (144, 96)), reference: (max_error: 0.1, max_spp: 1024))"
+             view: (size: (96, 64)), reference: (max_error: 0.15, max_spp: 1024))"
         ),
     )
 }
