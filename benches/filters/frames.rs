@@ -41,8 +41,8 @@ const ROWS: [(&str, &str, &str); 15] = [
     ("Harmonics", "FilteredNormals()", "Box(wavelength: 4)"),
     ("Harmonics", "FilteredNormals()", "Normalized(std: 0.25)"),
     ("light", "FilteredNormals(signal: Irradiance)", "Gaussian(width: 1)"),
-    ("neighbours", "FilteredNormals()", "Neighbours(sigma_tr: 1, radius: 3, weights: Area)"),
-    ("neighbours", "FilteredNormals()", "Neighbours(sigma_tr: (0.8, 1, 1.2), radius: 3, weights: Area)"),
+    ("neighbours", "FilteredNormals()", "Neighbours(sigma_tr: 1, radius: 3)"),
+    ("neighbours", "FilteredNormals()", "Neighbours(sigma_tr: (0.8, 1, 1.2), radius: 3)"),
 ];
 
 struct Told;
@@ -102,7 +102,7 @@ pub fn frames(sizes: &[usize]) -> String {
     session.timed = true;
     let mut table = String::from(
         "                                                                                                    relMSE  DSSIM   FLIP    bias\n\
-         vertices  engine       kernel                                normals   frame, ms (quartiles)   over paint (quartiles)   against the volumetric truth, then the diffusion truth\n",
+         vertices  engine       kernel                                           normals   frame, ms (quartiles)   over paint (quartiles)   against the volumetric truth, then the diffusion truth\n",
     );
     for &thousands in sizes {
         let mesh = mesh(thousands);
@@ -173,7 +173,7 @@ fn measured(session: &mut Session, folder: &Path, thousands: usize, mesh: &Mesh,
         let ratio = quartiles(entry.times.iter().zip(&paint.times).map(|(time, paint)| time / paint).collect());
         write!(
             table,
-            "{:8}  {engine:<12} {:<38} {normals:2}  {:6.1} ({:5.1} to {:5.1})   {:5.3} ({:5.3} to {:5.3})  ",
+            "{:8}  {engine:<12} {:<48} {normals:2}  {:6.1} ({:5.1} to {:5.1})   {:5.3} ({:5.3} to {:5.3})  ",
             mesh.positions.len(),
             if engine.starts_with("paint") { "" } else { kernel },
             frame.median,
