@@ -101,7 +101,7 @@ pub fn frames(sizes: &[usize]) -> String {
     let mut session = Session::new(options);
     session.timed = true;
     let mut table = String::from(
-        "                                                                                                    relMSE  DSSIM   FLIP    bias\n\
+        "                                                                                                                                relMSE  DSSIM   FLIP    bias\n\
          vertices  engine       kernel                                           normals   frame, ms (quartiles)   over paint (quartiles)   against the volumetric truth, then the diffusion truth\n",
     );
     for &thousands in sizes {

@@ -100,7 +100,10 @@ fn main() {
         }
         let table = table(&sizes);
         if asked("--write") {
-            std::fs::write(file, format!("{}\n{table}", machine())).expect("tools/runs can be written");
+            // What is below the rule is thought, not written.
+            let before = std::fs::read_to_string(file).unwrap_or_default();
+            let below = before.find("\n----\n").map_or("", |rule| &before[rule..]);
+            std::fs::write(file, format!("{}\n{table}{below}", machine())).expect("tools/runs can be written");
         }
     }
 }
