@@ -1,16 +1,21 @@
-//! What thickness costs and what it is worth: `cargo bench --bench thickness -- rays` compares the sweeps that bake lengths with
-//! a traversal of a hierarchy of boxes, and `-- pictures` draws a figure lit from three sides by each method, measures it
-//! against the truth with the brightness of all pictures made alike, as [Tomaszewska2012, fig. 4] does with observers, and
-//! writes `docs/thickness.png`. Truths are those of `diaphane bench scenes/bench/thickness-*.ron`, which takes the times, and
-//! whoever of the two comes second finds them made.
+//! What thickness costs and what it is worth.
+//!
+//! `cargo bench --bench thickness -- rays` compares the sweeps that bake lengths with a traversal of a hierarchy of boxes.
+//!
+//! `-- pictures` draws a figure lit from three sides by each method and setting of `scenes/bench/thickness-*.bench.ron`, as
+//! `diaphane bench` does, and holds each picture against the truth a second time, made as bright as that in the mean: so does
+//! [Tomaszewska2012, fig. 4] with observers. Truths take most of the time, some minutes for each side; `-- pictures 128` makes
+//! do with 128 paths per pixel. What was interrupted goes on where it was: samples are kept in `target/tmp/thickness`, truths
+//! with all bakes. With `--write` the tables go to `tools/runs/thickness.txt`, above the words that stand there, and the sheet
+//! of pictures to `docs/thickness.png`.
 
-use diaphane::bench::errors;
+use diaphane::bench::errors::Traced;
+use diaphane::bench::samples::{Samples, Subject};
+use diaphane::bench::statistics::Quartiles;
+use diaphane::bench::{Case, Machine, Measured, Record, Wishes, measure};
 use diaphane::geometry::{sculpture, thickness};
 use diaphane::image::{Display, Format, Image, Tone, write_file};
-use diaphane::metric::{Comparison, Pair};
-use diaphane::render::Look;
-use diaphane::scene::{Scene, TechniqueText, Truth};
-use diaphane::session::{Goal, Options, Session};
+use diaphane::session::{Options, Session};
 use diaphane::store::{PlannedStep, Watch};
 use glam::Vec3A;
 use obvhs::BvhBuildParams;
@@ -29,7 +34,7 @@ fn main() {
         rays();
     }
     if asked("pictures") || neither {
-        pictures();
+        pictures(words.iter().find_map(|word| word.parse().ok()), asked("--write"));
     }
 }
 
@@ -106,117 +111,111 @@ impl Watch for Told {
 }
 
 const SIDES: [&str; 3] = ["back", "front", "left"];
-/// As `scenes/bench/thickness-*.bench.ron` have it.
-const SIZE: (u32, u32) = (80, 128);
-const AT_MOST: f64 = 0.02;
-const MAX_SAMPLES: u64 = 1024;
 /// How many pixels of the sheet show one of a picture, along each side.
 const SHOWN: u32 = 2;
 /// The columns of the sheet, behind the truth.
 const COLUMNS: [&str; 4] = ["SphericalThickness()", "DepthMapThickness()", "FilteredNormals()", "Opaque()"];
-const PAPERS: [&str; 2] = [
-    "SphericalThickness(terms: Paper, attenuation: Linear, encode: Thickness)",
-    "DepthMapThickness(terms: Paper, attenuation: Beer, sigma: Extinction)",
-];
+const SHEET: &str = "docs/thickness.png";
+const TABLES: &str = "tools/runs/thickness.txt";
+/// What is above is written, what is below is thought.
+const RULE: &str = "----\n";
 
-struct Studio {
-    session: Session,
-    told: Told,
+/// A picture as bright as the truth in the mean of what is seen, and the factor that takes.
+fn alike(truth: &Traced, image: &Image) -> (Image, f32) {
+    let mean = |image: &Image| {
+        let seen = image.pixels.iter().zip(&truth.mask).filter(|(_, is_object)| **is_object);
+        seen.flat_map(|(pixel, _)| pixel).map(|v| f64::from(*v)).sum::<f64>()
+    };
+    let factor = (mean(&truth.picture) / mean(image).max(f64::MIN_POSITIVE)) as f32;
+    let pixels = image.pixels.iter().map(|pixel| pixel.map(|v| factor * v)).collect();
+    (Image { pixels, ..image.clone() }, factor)
 }
 
-/// What pictures are measured against.
-struct Truthful {
-    picture: Image,
-    variance: Image,
-    mask: Vec<bool>,
+/// One row of both tables for one side: at the truth's brightness, and as it is.
+fn rows(truth: &Traced, subject: &Subject, picture: &Image, samples: &Samples, plain: f64) -> [String; 2] {
+    let (shown, factor) = alike(truth, picture);
+    let errors = Samples(truth.errors(subject, &shown).unwrap_or_else(|problem| panic!("{problem}")));
+    let error = |samples: &Samples, measure: &str| samples.value(subject, &format!("{measure}@volume")).expect("it is");
+    let of = |samples: &Samples| ["relmse", "dssim", "flip_mean"].map(|measure| error(samples, measure));
+    let [relmse, dssim, flip] = of(&errors);
+    let alike = format!("{factor:8.3} {relmse:7.3} {dssim:.4} {flip:.4}");
+    let [relmse, dssim, flip] = of(samples);
+    let Quartiles { low, median, high, .. } =
+        Quartiles::of(samples.values(subject, "frame").map(|time| time / plain)).expect("there are frames");
+    let bias = error(samples, "bias");
+    [alike, format!("{bias:+7.3} {relmse:7.3} {dssim:.4} {flip:.4} {median:5.2} ({low:4.2} to {high:5.2})")]
 }
 
-impl Studio {
-    fn look(scene: &Scene, technique: &str) -> Look {
-        let mut look = Look::of(scene);
-        look.technique = TechniqueText::from_flag("--technique", technique).expect("it can be read");
-        look.view.size = SIZE;
-        look.view.part = errors::PART;
-        look
-    }
-
-    fn truth(&mut self, scene: &Scene) -> Truthful {
-        let view = Studio::look(scene, "Opaque()").view;
-        let settings = errors::settings(Truth::Volume, scene, &view);
-        let goal = Goal::Error { part: errors::PART, at_most: AT_MOST, min_samples: 64, max_samples: MAX_SAMPLES };
-        let film = self.session.trace(scene, &settings, &goal, &self.told, |film| {
-            eprintln!("  {}", film.level(errors::PART));
-        });
-        let film = film.unwrap_or_else(|problem| panic!("{problem}"));
-        println!("the truth: {}", film.level(errors::PART));
-        Truthful {
-            picture: film.picture(errors::PART),
-            variance: film.variance(errors::PART),
-            mask: film.pixels.iter().map(|pixel| pixel.is_object).collect(),
-        }
-    }
-
-    fn picture(&mut self, scene: &Scene, technique: &str) -> Image {
-        let look = Studio::look(scene, technique);
-        let drawn = self.session.render(scene, &look, &self.told).unwrap_or_else(|problem| panic!("{problem}"));
-        drawn.1.as_ref().clone()
-    }
-}
-
-impl Truthful {
-    fn mean(&self, image: &Image) -> f32 {
-        let seen = || image.pixels.iter().zip(&self.mask).filter(|(_, is_object)| **is_object);
-        seen().flat_map(|(pixel, _)| pixel).sum::<f32>() / (3 * seen().count()) as f32
-    }
-
-    /// As bright as the truth in the mean, and what that took.
-    fn alike(&self, image: &Image) -> (Image, f32) {
-        let factor = self.mean(&self.picture) / self.mean(image).max(f32::MIN_POSITIVE);
-        let pixels = image.pixels.iter().map(|pixel| pixel.map(|v| factor * v)).collect();
-        (Image { pixels, ..image.clone() }, factor)
-    }
-
-    fn told(&self, image: &Image) -> String {
-        let pair =
-            Pair::new(image, &self.picture).and_then(|pair| pair.masked(&self.mask)).expect("they are of one size");
-        let found = Comparison::of(&pair, Some(&self.variance)).expect("they can be compared");
-        format!("{:.4} {:.4} {:.4}", found.relmse.errors.all.mean, found.dssim.all.mean, found.flip.spread.mean)
-    }
-}
-
-fn pictures() {
+fn pictures(paths: Option<u64>, write: bool) {
     let options = Options { cache_dir: std::env::var_os("DIAPHANE_CACHE").map(Into::into), ..Options::default() };
-    let mut studio = Studio { session: Session::new(options), told: Told::default() };
-    let mut rows: Vec<Vec<Image>> = Vec::new();
-    println!("factor to the truth's brightness; relMSE, DSSIM, FLIP with it; the same three without");
+    let mut session = Session::new(options);
+    let machine = session.gpu().map(Machine::of).expect("there is an adapter, software will do");
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("thickness");
+    let mut record = Record::open(&folder, machine).unwrap_or_else(|problem| panic!("{problem}"));
+    let Machine { cpu, threads, commit, date, .. } = &record.machine;
+    let mut text = format!(
+        "drawn:  {}\nCPU:    {cpu}, {threads} threads\ncommit: {commit}\ndate:   {date}\n",
+        record.machine.drawn_on()
+    );
+    let (mut sheet, mut names, mut tables) = (Vec::new(), Vec::new(), [Vec::new(), Vec::new()]);
     for side in SIDES {
         let path = format!("scenes/bench/thickness-{side}.ron");
-        println!("\n{path}");
-        let scene = studio.session.scene(Path::new(&path)).unwrap_or_else(|problems| panic!("{problems}")).0;
-        let truth = studio.truth(&scene);
-        let mut measure = |technique: &str| {
-            let picture = studio.picture(&scene, technique);
-            let (shown, factor) = truth.alike(&picture);
-            println!("{technique:75} {factor:7.3}  {}  {}", truth.told(&shown), truth.told(&picture));
-            shown
+        let wishes = Wishes::default();
+        let mut case = Case::read(&session, Path::new(&path), &wishes).unwrap_or_else(|wrong| panic!("{wrong}")).0;
+        case.max_samples = paths.unwrap_or(case.max_samples);
+        let told = Told::default();
+        let measured = measure(&mut session, &case, &mut record, &told, &|line| eprintln!("{line}"));
+        let Measured { truths, shown, .. } = measured.unwrap_or_else(|problem| panic!("{problem}"));
+        let [truth] = &truths[..] else { panic!("{path} is held against one truth") };
+        text += &format!("{side:6} {}\n", truth.film.level(diaphane::bench::errors::PART));
+        let picture = |name: &str| {
+            let found = shown.iter().find(|shown| shown.subject.words() == name);
+            found.unwrap_or_else(|| panic!("{path} is not measured with {name}"))
         };
-        let drawn: Vec<Image> = COLUMNS.iter().map(|technique| measure(technique)).collect();
-        for technique in PAPERS {
-            measure(technique);
+        let plain = record.samples.values(&picture("Opaque()").subject, "frame");
+        let plain = Quartiles::of(plain).expect("there are frames").median;
+        names = shown.iter().map(|shown| shown.subject.words()).collect();
+        for shown in &shown {
+            let found = rows(truth, &shown.subject, &shown.picture, &record.samples, plain);
+            tables.iter_mut().zip(found).for_each(|(table, row)| table.push(row));
         }
-        for bands in 2..=7 {
-            measure(&format!("SphericalThickness(bands: {bands}, front_bands: {bands})"));
-        }
-        rows.push([truth.picture].into_iter().chain(drawn).collect());
+        let columns = COLUMNS.map(|name| alike(truth, &picture(name).picture).0);
+        sheet.push([truth.picture.clone()].into_iter().chain(columns).collect::<Vec<Image>>());
     }
-    let (width, height) = (rows[0].len() as u32 * SIZE.0 * SHOWN, rows.len() as u32 * SIZE.1 * SHOWN);
+    let titles = [
+        "At the brightness of the truth: the factor that this takes, relMSE, DSSIM, FLIP",
+        "Brightness as it is: bias (0.26 is 26 % too bright), relMSE, DSSIM, FLIP, and the time of a frame over the median of \
+         Opaque's, with quartiles",
+    ];
+    for (title, table) in titles.into_iter().zip(tables) {
+        text += &format!("\n{title}\n\n{:90}", "");
+        let width = table[0].len();
+        SIDES.iter().for_each(|side| text += &format!("{side:^width$}   "));
+        for (i, name) in names.iter().enumerate() {
+            text += &format!("\n{name:90}");
+            (0..SIDES.len()).for_each(|side| text += &format!("{}   ", table[side * names.len() + i]));
+        }
+        text += "\n";
+    }
+    println!("{text}");
+    if write {
+        let before = std::fs::read_to_string(TABLES).unwrap_or_default();
+        let thought = before.split_once(RULE).map_or("", |(_, below)| below);
+        std::fs::write(TABLES, format!("{text}\n{RULE}{thought}")).expect("tools/runs can be written");
+        write_sheet(&sheet);
+    }
+}
+
+/// One row for each side: the truth, then the columns.
+fn write_sheet(rows: &[Vec<Image>]) {
+    let (across, down) = (rows[0][0].width, rows[0][0].height);
+    let (width, height) = (rows[0].len() as u32 * across * SHOWN, rows.len() as u32 * down * SHOWN);
     let texel = |i: u32| {
         let (x, y) = (i % width / SHOWN, i / width / SHOWN);
-        let image = &rows[(y / SIZE.1) as usize][(x / SIZE.0) as usize];
-        image.pixels[(y % SIZE.1 * SIZE.0 + x % SIZE.0) as usize]
+        rows[(y / down) as usize][(x / across) as usize].at(x % across, y % down)
     };
     let sheet = Image { width, height, pixels: (0..width * height).map(texel).collect() };
     let display = Display { tone: Tone::Srgb, exposure_ev: 0.0 };
     let png = sheet.encode(Format::Png, display, &[]).expect("a picture can be encoded");
-    write_file(Path::new("docs/thickness.png"), &png).unwrap_or_else(|problem| panic!("{problem}"));
+    write_file(Path::new(SHEET), &png).unwrap_or_else(|problem| panic!("{problem}"));
 }

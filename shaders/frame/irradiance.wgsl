@@ -45,7 +45,8 @@ fn compute(@builtin(global_invocation_id) id: vec3u) {
     var from_lamp = entering(light, point, normal, object.eta);
 #if SHADOWED
     if any(from_lamp > vec3f(0.0)) {
-        from_lamp *= sees(point, normalize(normal), object.entry, light);
+        let up = normalize(normal);
+        from_lamp *= sees(point, up, object.entry * up, light);
     }
 #endif
     sum += from_lamp;

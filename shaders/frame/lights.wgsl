@@ -41,6 +41,10 @@ fn incident(light: Light, i: i32, point: vec3f) -> Incident {
     }
     let to_light = light_sample(light, i) - point;
     let distance = length(to_light);
+    // A lamp at the point itself shines along no direction.
+    if distance == 0.0 {
+        return Incident(vec3f(0.0), vec3f(0.0), 0.0, 0.0);
+    }
     let direction = to_light / distance;
     if light.kind == POINT {
         return Incident(direction, light.power / (distance * distance), distance, 0.0);

@@ -29,8 +29,8 @@ fn face(d: vec3f) -> u32 {
     return select(4u, 5u, d.z < 0.0);
 }
 
-// How much of sample `i` is seen from `entry` above a point whose surface faces along `normal`.
-fn sees_sample(point: vec3f, normal: vec3f, entry: f32, light: Light, i: i32) -> f32 {
+// How much of sample `i` is seen from a point, and `lift` away from it, whose triangle faces along `normal`.
+fn sees_sample(point: vec3f, normal: vec3f, lift: vec3f, light: Light, i: i32) -> f32 {
     let to_light = select(light_sample(light, i) - point, light.position, light.kind == DIRECTIONAL);
     var index = u32(i) * views.per_sample;
     var view = shadow_views[index];
@@ -39,8 +39,8 @@ fn sees_sample(point: vec3f, normal: vec3f, entry: f32, light: Light, i: i32) ->
     // A texel covers a slope: stepping off it along the normal, by as much as the filter is wide, takes the surface out
     // of its own shadow, whatever the scene's scale.
     let texel = view.texel * depth;
-    let offset = entry + texel * (0.5 + 2.0 * sqrt(max(0.0, 1.0 - cos_light * cos_light)));
-    let lifted = point + offset * normal;
+    let offset = texel * (0.5 + 2.0 * sqrt(max(0.0, 1.0 - cos_light * cos_light)));
+    let lifted = point + lift + offset * normal;
     // Near the edge of a cube's face the step may lead over it.
     if views.per_sample == 6u {
         index += face(lifted - point - to_light);
@@ -67,14 +67,14 @@ fn sees_sample(point: vec3f, normal: vec3f, entry: f32, light: Light, i: i32) ->
 }
 
 // The mean over the lamp's samples, each weighted by what it sends here.
-fn sees(point: vec3f, normal: vec3f, entry: f32, light: Light) -> f32 {
+fn sees(point: vec3f, normal: vec3f, lift: vec3f, light: Light) -> f32 {
     var sum = 0.0;
     var weight = 0.0;
     for (var i = 0; i < light_samples(light); i++) {
         let light_in = incident(light, i, point);
         let w = light_in.irradiance.r + light_in.irradiance.g + light_in.irradiance.b;
         if w > 0.0 {
-            sum += w * sees_sample(point, normal, entry, light, i);
+            sum += w * sees_sample(point, normal, lift, light, i);
             weight += w;
         }
     }

@@ -73,7 +73,12 @@ macro_rules! entry {
 /// Every technique there is.
 pub const REGISTRY: &[Entry] = &[
     entry!(opaque, Opaque),
-    entry!(filtered_normals, FilteredNormals, "FilteredNormals(engine: Harmonics)"),
+    entry!(
+        filtered_normals,
+        FilteredNormals,
+        "FilteredNormals(engine: Harmonics)",
+        "FilteredNormals(signal: Irradiance)"
+    ),
     entry!(
         layered,
         Layered,

@@ -162,6 +162,25 @@ fn a_kernel_that_is_too_steep_for_an_engine() {
 }
 
 #[test]
+fn light_that_is_filtered_needs_eigenpairs_of_all_areas() {
+    let desk = Desk::new();
+    let explain = |technique: &str| desk.run(&["explain", "scene.ron", "--technique", technique]);
+    let refused = "FilteredNormals(signal: Irradiance";
+    for (filter, more, what, hint) in [
+        ("Gaussian(width: 2)", "laplacian: MeanArea", "over one mean area light would not be conserved", "MeanArea"),
+        ("Gaussian(width: 2)", "engine: Krylov", "a basis that is made for normals does not hold light", "Krylov"),
+        ("Neighbours(sigma_tr: 1, radius: 2)", "engine: Auto", "filters by frequency, not over neighbours", "Normals"),
+    ] {
+        desk.write("stone.ron", format!("Material(version: 1, filter: {filter})"));
+        let told = explain(&format!("{refused}, {more})"));
+        told.fails(1, &["stone.ron:1:30: error: filter: ", what, hint]);
+        explain(&format!("FilteredNormals({more})")).ok();
+    }
+    desk.write("stone.ron", "Material(version: 1, filter: Gaussian(width: 2))");
+    explain("FilteredNormals(signal: Irradiance)").ok();
+}
+
+#[test]
 fn a_technique_that_is_not_there_yet() {
     let desk = Desk::new();
     for name in ["SphericalThickness(bands: 5)", "LongRange()", "ScreenSpace", "Auto"] {

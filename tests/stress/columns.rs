@@ -25,7 +25,7 @@ impl Column {
 }
 
 /// Settings that make other light, and so have columns of their own.
-const OTHERWISE: [&str; 1] = ["Layered(multiple: true)"];
+const OTHERWISE: [&str; 2] = ["FilteredNormals(signal: Irradiance)", "Layered(multiple: true)"];
 
 /// Few paths, so that the grid is done in time: what is looked for is not noise.
 const SAMPLES: u32 = 8;

@@ -13,11 +13,11 @@
 //! Costs: a map of the object for each lamp (16 for an area light, six faces of a cube for a lamp nearby), made again when
 //! one of the two moves, and a pass over its pixels. No bake: what deforms costs no more.
 //!
-//! Fails on concave objects, by construction: a map holds one entry, so that a hole counts as filled, and depths jump at
-//! edges between near and far parts, which show as bright and dark seams on whatever lies behind. `scenes/bench/ears.ron`
-//! shows them where the head's outline falls on the body. It knows nothing of surroundings: they are scattered where they
-//! enter, and none of them comes through. Light that comes through is not taken from what is scattered back, as
-//! `SphericalThickness` does, so that thin things are too bright in front.
+//! Fails on concave objects, by construction: a map holds one entry, so that a gap counts as filled, and depths jump at
+//! edges between near and far parts, which show as seams on whatever lies behind: `scenes/gaps.ron` has a knot with them,
+//! beside one of `SphericalThickness`. `blur` softens seams, and leaves gaps filled. It knows nothing of surroundings: they
+//! are scattered where they enter, and none of them comes through. Light that comes through is not taken from what is
+//! scattered back, as `SphericalThickness` does, so that thin things are too bright in front.
 //!
 //! ```
 //! use diaphane::scene::TechniqueText;

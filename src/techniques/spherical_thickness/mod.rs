@@ -31,8 +31,8 @@
 //!
 //! Fails where light does not go straight: it spreads sideways in truth, so that the far side of a thick thing is too dark
 //! behind a thin neighbour and edges of thickness show on the surface, softened only by how few bands there are. It sees the
-//! mesh's vertices: thin parts need some. `scenes/bench/ears.ron` shows it where the ears meet the head. A lamp near the
-//! surface shines as bright behind as it does at the vertex itself. Holes in a mesh let light in.
+//! mesh's vertices: thin parts need some, and the narrow ear of `scenes/bench/ears.ron` is mottled along its rim. A lamp near
+//! the surface shines as bright behind as it does at the vertex itself. Holes in a mesh let light in.
 //!
 //! ```
 //! use diaphane::scene::TechniqueText;

@@ -1,11 +1,14 @@
 //! What filtered normals cost and how exact they are: engines, kernels and sizes of a mesh.
 //!
-//! `cargo bench --bench filters` prints a table; `cargo bench --bench filters -- --write` also writes it, with the machine, to
-//! `tools/runs/filters.txt`. Arguments are the numbers of vertices, in thousands: `-- 2 35 140`; eigenpairs are found for up
-//! to `PAIRS` of them. *bake* is from a mesh to its basis, *first* from a kernel to new normals for the first time and *edit*
-//! the median of more, in time that one core had for it: what else the machine does makes it no longer. Errors are the largest
-//! difference at any vertex from a space made for this kernel alone with a tolerance of 1e-8, which the tests hold against
-//! dense algebra on smaller meshes.
+//! `cargo bench --bench filters -- fields` prints a table of fields of normals, `-- frames` one of frames and pictures
+//! ([`frames`]), without either word both; with `--write` they are written, with the machine, to `tools/runs/filters.txt` and
+//! `tools/runs/filtered-frames.txt`. Other arguments are the numbers of vertices, in thousands: `-- fields 2 35 140`;
+//! eigenpairs are found for up to [`PAIRS`] of them. *bake* is from a mesh to its basis, *first* from a kernel to new normals
+//! for the first time and *edit* the median of more, in time that one core had for it: what else the machine does makes it no
+//! longer. Errors are the largest difference at any vertex from a space made for this kernel alone with a tolerance of 1e-8,
+//! which the tests hold against dense algebra on smaller meshes.
+
+mod frames;
 
 use diaphane::bench::Machine;
 use diaphane::geometry::laplacian::{Areas, Laplacian};
@@ -84,15 +87,46 @@ impl Exact<'_> {
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
-    let mut sizes: Vec<usize> = words.iter().filter_map(|word| word.parse().ok()).collect();
-    if sizes.is_empty() {
-        sizes = vec![2, 35, 140];
+    let asked = |word: &str| words.iter().any(|w| w == word);
+    let sizes: Vec<usize> = words.iter().filter_map(|word| word.parse().ok()).collect();
+    let sizes = if sizes.is_empty() { vec![2, 35, 140] } else { sizes };
+    let neither = !asked("fields") && !asked("frames");
+    for (word, table, file) in [
+        ("fields", fields as fn(&[usize]) -> String, "tools/runs/filters.txt"),
+        ("frames", frames::frames, "tools/runs/filtered-frames.txt"),
+    ] {
+        if !asked(word) && !neither {
+            continue;
+        }
+        let table = table(&sizes);
+        if asked("--write") {
+            // What is below the rule is thought, not written.
+            let before = std::fs::read_to_string(file).unwrap_or_default();
+            let below = before.find("\n----\n").map_or("", |rule| &before[rule..]);
+            std::fs::write(file, format!("{}\n{table}{below}", machine())).expect("tools/runs can be written");
+        }
     }
+}
+
+/// What it was measured on.
+fn machine() -> String {
+    let mut session = Session::new(Options { no_cache: true, ..Options::default() });
+    let machine = session.gpu().map(Machine::of).expect("there is an adapter, software will do");
+    let profile = if cfg!(debug_assertions) { "a development build: upper bounds" } else { "a release build" };
+    let Machine { cpu, threads, commit, date, .. } = &machine;
+    let drawn_on = machine.drawn_on();
+    format!(
+        "CPU:    {cpu}, {threads} threads\ndrawn:  {drawn_on}\ncommit: {commit}\ndate:   {date}\nbuild:  {profile}\n"
+    )
+}
+
+/// The table of bakes, edits and errors of fields.
+fn fields(sizes: &[usize]) -> String {
     let still = |_: f64| Ok(());
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread can be had");
     let mut table =
         String::from("vertices  engine     modes      bake     first     edit  kernel (knee over omega_m)     error\n");
-    for thousands in sizes {
+    for &thousands in sizes {
         let mesh = mesh(thousands);
         let vertices = mesh.positions.len();
         let exact = Exact::of(&mesh);
@@ -136,13 +170,5 @@ fn main() {
         }
         print!("{table}");
     }
-    if words.iter().any(|word| word == "--write") {
-        let mut session = Session::new(Options { no_cache: true, ..Options::default() });
-        let machine = session.gpu().map(Machine::of).expect("there is an adapter, software will do");
-        let profile = if cfg!(debug_assertions) { "a development build: upper bounds" } else { "a release build" };
-        let Machine { cpu, threads, commit, date, .. } = machine;
-        let text =
-            format!("CPU:    {cpu}, {threads} threads\ncommit: {commit}\ndate:   {date}\nbuild:  {profile}\n\n{table}");
-        std::fs::write("tools/runs/filters.txt", text).expect("tools/runs can be written");
-    }
+    table
 }
