@@ -5,9 +5,9 @@
 //!
 //! x_i is sought by a line along the normal at x_o or along one of two tangents, at a radius drawn from one channel's
 //! profile [King2013]. Each place where the line meets the thing has a density, that of all axes and channels together
-//! (the balance heuristic), and of all exits that share it ([`super::kin`]). Of these places one is drawn: half the time in
-//! proportion to R_d over its density, half the time evenly, as [Pharr2016, 15.4.2] always does, since what is nothing to
-//! this exit may be much to another. More differs from there: neither radii nor lines end, so nothing is cut off; the line meets the same thing,
+//! (the balance heuristic), and of all exits that share it ([`super::kin`]). Of these places one is drawn in proportion to
+//! R_d over its density, where [Pharr2016, 15.4.2] draws evenly; and evenly half the time where exits share, since what is
+//! nothing to one may be much to another. More differs from there: neither radii nor lines end, so nothing is cut off; the line meets the same thing,
 //! not the same material, so that things which touch do not bleed into one another; and some lines are laid anywhere
 //! through the thing, since a profile's own radii seldom lead to its far side, from which a lamp behind it shines.
 
@@ -52,7 +52,8 @@ impl Bssrdf {
     }
 
     /// A place of the same thing from which light comes to `exit`; `None` when the line met nothing that sends any.
-    pub fn entry(&self, world: &World, exit: &Point, random: &mut Random) -> Option<Entry> {
+    /// Of the places on a line one is drawn evenly with the chance `evenly`, else by what it counts here.
+    pub fn entry(&self, world: &World, exit: &Point, evenly: f64, random: &mut Random) -> Option<Entry> {
         let axes = axes(exit);
         let axis = [0, 0, 1, 2][random.choice(4)];
         let ball = world.balls[exit.thing()];
@@ -70,11 +71,12 @@ impl Bssrdf {
                 // At no distance R_d is infinite, and no line comes upon a triangle from its edge: both have no chance.
                 (point.p != exit.p && density > 0.0).then(|| (point, self.r_d(exit, &point).element_sum() / density))
             })
+            .filter(|(_, weight)| *weight > 0.0 || evenly > 0.0)
             .collect();
         let last = places.len().checked_sub(1)?;
         let total: f64 = places.iter().map(|(_, weight)| weight).sum();
-        let even = 1.0 / places.len() as f64;
-        let chance = |weight: f64| if total > 0.0 { 0.5 * (even + weight / total) } else { even };
+        let each = 1.0 / places.len() as f64;
+        let chance = |weight: f64| if total > 0.0 { evenly * each + (1.0 - evenly) * weight / total } else { each };
         let mut sought = random.unit();
         let drawn = places.iter().position(|(_, weight)| {
             sought -= chance(*weight);

@@ -2,10 +2,11 @@
 //!
 //! Below a surface paths of neighbouring pixels lie close together, and most of their work comes later: each could have gone
 //! where another went. A path is cut at its first flight from particle to particle that is neither short nor long: what lies
-//! near to one stem is far more likely found from there than from any other, and what lies far from all is not looked at. The particles where that flight could have begun are the
-//! path's stems, the one where it ends is its find. Light that comes by a find counts for every stem of the kin that sees
-//! it, divided by the density with which all these stems together come upon it (the balance heuristic). What a path brings
-//! by other ways is its own. Profiles are shared likewise: where light enters for one exit, it does for the others.
+//! near to one particle is far more likely found from there than from any other, and what lies far from all is not looked
+//! at. The particles where that flight could have begun are the path's stems, the one where it ends is its find. Light that
+//! comes by a find counts for every stem of the kin that sees it, divided by the density with which all these stems together
+//! come upon it (the balance heuristic). What a path brings by other ways is its own. Profiles are shared likewise: where
+//! light enters for one exit, it does for the others.
 //!
 //! Nothing is approximated: a pixel's mean is what it would be alone, whoever its kin are. Only their noise is alike.
 
@@ -110,7 +111,7 @@ impl Shared {
 }
 
 impl Strand {
-    /// The end of a path, whose own light is counted by `share`.
+    /// A path has come to its end.
     pub(super) fn end(&mut self, walk: Walk) {
         let mut own = walk.sum;
         if let Some(Shared { stems, mut find, before, .. }) = walk.shared {

@@ -70,7 +70,7 @@ impl Tracer {
                 Some(self.entering(point, side, surface.ior, *albedo * thing.leaving(surface, point, d), random))
             }
             Matter::Bssrdf { surface, bssrdf } if side > 0.0 => {
-                let Entry { point: entry, weight } = bssrdf.entry(&self.world, point, random)?;
+                let Entry { point: entry, weight } = bssrdf.entry(&self.world, point, 0.0, random)?;
                 let density = bssrdf.density(point, &entry, self.world.balls[point.thing()]);
                 let scale = weight / density * bssrdf.r_d(point, &entry) * thing.leaving(surface, point, d);
                 Some(self.entering(&entry, 1.0, surface.ior, scale, random))

@@ -85,7 +85,7 @@ impl Tracer {
             }
             Matter::Bssrdf { surface, bssrdf } if self.kin => {
                 strand.parts.glossy = self.follow(self.gloss(thing, surface, point, direction, random), random);
-                let entry = bssrdf.entry(&self.world, point, random).map(|entry| {
+                let entry = bssrdf.entry(&self.world, point, 0.5, random).map(|entry| {
                     let light = self.entering(&entry.point, 1.0, surface.ior, Rgb::ONE, random);
                     (entry, self.follow(Some(light), random))
                 });

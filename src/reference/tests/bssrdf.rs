@@ -78,7 +78,7 @@ fn entries_are_found_wherever_they_are() {
         let (mut sum, mut squares) = (Rgb::ZERO, Rgb::ZERO);
         let mut random = Random::new(5, 5, 5);
         for _ in 0..samples {
-            let value = bssrdf.entry(&world, &exit, &mut random).map_or(Rgb::ZERO, |entry| {
+            let value = bssrdf.entry(&world, &exit, 0.3, &mut random).map_or(Rgb::ZERO, |entry| {
                 assert_eq!(entry.point.thing(), 0);
                 let weight = entry.weight / bssrdf.density(&exit, &entry.point, world.balls[0]);
                 weight * light(entry.point.p) * bssrdf.r_d(&exit, &entry.point)
