@@ -7,9 +7,10 @@
 //! profile [King2013]. Each place where the line meets the thing has a density, that of all axes and channels together
 //! (the balance heuristic), and of all exits that share it ([`super::kin`]). Of these places one is drawn in proportion to
 //! R_d over its density, where [Pharr2016, 15.4.2] draws evenly; and evenly half the time where exits share, since what is
-//! nothing to one may be much to another. More differs from there: neither radii nor lines end, so nothing is cut off; the line meets the same thing,
-//! not the same material, so that things which touch do not bleed into one another; and some lines are laid anywhere
-//! through the thing, since a profile's own radii seldom lead to its far side, from which a lamp behind it shines.
+//! nothing to one may be much to another. More differs from there: neither radii nor lines end, so nothing is cut off; the
+//! line meets the same thing, not the same material, so that things which touch do not bleed into one another; and some lines
+//! are laid anywhere through the thing, since a profile's own radii seldom lead to its far side, from which a lamp behind it
+//! shines.
 
 use super::random::Random;
 use super::world::{Ball, Point, World};
