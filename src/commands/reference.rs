@@ -3,7 +3,7 @@ use super::progress::{Progress, seconds};
 use super::{Answer, counted, session};
 use crate::image::{Display, Format, Image, decode, exr_text, write_file};
 use crate::problem::{At, Cause, Problem, Problems};
-use crate::reference::{self, volume::Light};
+use crate::reference::{self, film, volume::Light};
 use crate::session::{Goal, Options, whole};
 use crate::store::{Key, Origin};
 use serde_json::json;
@@ -259,7 +259,7 @@ impl Merge {
                 return Err(Problem::files(what).at(At::file(path)).hint("name each tile once"));
             }
             let width = picture.width as usize;
-            for y in (tile.place as usize - 1..picture.height as usize).step_by(tile.of as usize) {
+            for y in film::rows((tile.place - 1, tile.of), picture.height).map(|y| y as usize) {
                 picture.pixels[y * width..][..width].copy_from_slice(&tile.image.pixels[y * width..][..width]);
             }
         }

@@ -109,6 +109,12 @@ impl Moments {
     }
 }
 
+/// The rows of every `step`-th band from the `first` on: the tiles of a picture.
+pub fn rows((first, step): (u32, u32), height: u32) -> impl Iterator<Item = u32> {
+    let bands = (first..height.div_ceil(SIDE)).step_by(step as usize);
+    bands.flat_map(move |band| band * SIDE..height.min((band + 1) * SIDE))
+}
+
 fn rgb(value: [f32; 3]) -> Rgb {
     glam::Vec3::from(value).as_dvec3()
 }
@@ -123,9 +129,7 @@ impl Film {
 
     /// The rows that are here.
     pub fn rows(&self) -> impl Iterator<Item = u32> + use<> {
-        let height = self.height;
-        let bands = (self.first..height.div_ceil(SIDE)).step_by(self.step as usize);
-        bands.flat_map(move |band| band * SIDE..height.min((band + 1) * SIDE))
+        rows((self.first, self.step), self.height)
     }
 
     fn image(&self, value: impl Fn(&Pixel) -> [f32; 3]) -> Image {

@@ -31,7 +31,7 @@ fn agree_with_plain(what: &str, mut tracer: Tracer, blocks: u64) {
     tracer.kin = true;
     let (a, a_error) = measure_kin(&tracer, blocks);
     tracer.kin = false;
-    let (b, b_error) = measure(&tracer, 32 * blocks, at_one_place, |p| p.scattered);
+    let (b, b_error) = measure(&tracer, 128_000, at_one_place, |p| p.scattered);
     let error = (a_error * a_error + b_error * b_error).sqrt();
     let z = (a - b) / error;
     println!("{what}: {a} +- {a_error}, {b} +- {b_error}, z {z}");
@@ -70,6 +70,6 @@ fn kin_change_nothing_but_noise_of_profiles() {
         let things = vec![(knot.clone(), matter.clone()), (quad.clone(), Matter::Emitter(0))];
         let lamp = Lamp { kind: rect.clone(), shadow: true };
         let tracer = tracer(things, vec![lamp, sun(DVec3::new(-0.4, -0.5, -1.0))], Some(3.0), light, 16);
-        agree_with_plain(&format!("{light:?}"), tracer, 4_000);
+        agree_with_plain(&format!("{light:?}"), tracer, 16_000);
     }
 }
