@@ -45,11 +45,9 @@ fn kin_change_nothing_but_noise() {
     let knot = || shapes::torus_knot(2, 3, 0.5, 0.25, (96, 12));
     let sun = || sun(DVec3::new(-0.4, -0.5, -1.0));
     let colored = (Rgb::new(0.1, 0.3, 0.6), Rgb::new(2.0, 4.0, 9.0));
+    // Cut short, since what comes late is the same for both, and takes most of the time.
     for (what, ior, roughness, g, light, max_depth, blocks) in [
-        ("smooth", 1.4, 0.0, 0.3, Light::Direct, 1000, 4_000),
         ("smooth and cut short", 1.4, 0.0, -0.4, Light::Full, 6, 4_000),
-        ("rough", 1.3, 0.4, 0.0, Light::Direct, 1000, 4_000),
-        ("index-matched", 1.0, 0.0, 0.4, Light::Full, 1000, 4_000),
         ("index-matched and cut short", 1.0, 0.0, 0.4, Light::Direct, 5, 4_000),
     ] {
         let lamp = Lamp { kind: rect.clone(), shadow: true };
@@ -66,10 +64,8 @@ fn kin_change_nothing_but_noise_of_profiles() {
     let bssrdf = Bssrdf::new(Default::default(), medium, Phase::HenyeyGreenstein, 1.3);
     let matter = Matter::Bssrdf { surface: surface(1.3, 0.0), bssrdf: Box::new(bssrdf) };
     let knot = shapes::torus_knot(2, 3, 0.5, 0.25, (96, 12));
-    for light in [Light::Direct, Light::Full] {
-        let things = vec![(knot.clone(), matter.clone()), (quad.clone(), Matter::Emitter(0))];
-        let lamp = Lamp { kind: rect.clone(), shadow: true };
-        let tracer = tracer(things, vec![lamp, sun(DVec3::new(-0.4, -0.5, -1.0))], Some(3.0), light, 16);
-        agree_with_plain(&format!("{light:?}"), tracer, 16_000);
-    }
+    let things = vec![(knot, matter), (quad, Matter::Emitter(0))];
+    let lamp = Lamp { kind: rect, shadow: true };
+    let tracer = tracer(things, vec![lamp, sun(DVec3::new(-0.4, -0.5, -1.0))], Some(3.0), Light::Direct, 16);
+    agree_with_plain("a profile", tracer, 16_000);
 }
