@@ -102,6 +102,11 @@ impl Shared {
         self.stage == Stage::AtStem
     }
 
+    /// Whether there is no find yet: most of a path comes after, and need not be asked.
+    pub fn is_open(&self) -> bool {
+        self.find.is_none()
+    }
+
     /// The path meets a surface.
     pub fn pass_surface(&mut self) {
         if self.stage == Stage::AtStem {

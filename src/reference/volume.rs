@@ -272,7 +272,9 @@ impl Tracer {
     /// A path meets a medium's particle: light that is scattered there, and the way on.
     fn scatter(&self, walk: &mut Walk, medium: &Medium, random: &mut Random) {
         (walk.scattered, walk.struck) = (true, true);
-        walk.share(self.shares(walk, medium), kin::lengths(medium), random);
+        if walk.shared.as_ref().is_some_and(Shared::is_open) {
+            walk.share(self.shares(walk, medium), kin::lengths(medium), random);
+        }
         let from = walk.direction;
         // Channels may scatter differently: the direction is drawn for the hero, and weighs like a free path.
         let phase =
