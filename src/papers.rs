@@ -79,6 +79,10 @@ pub const PAPERS: &[Paper] = &[
     paper("Khronos2024", "Khronos Group. Khronos PBR Neutral Tone Mapper, 2024"),
     paper("King2013", "A. King, C. Kulla, A. Conty & M. Fajardo. BSSRDF Importance Sampling. SIGGRAPH 2013 talks"),
     paper(
+        "Lafortune1996",
+        "E. Lafortune & Y. Willems. Rendering Participating Media with Bidirectional Path Tracing. EGWR 1996",
+    ),
+    paper(
         "Maisch2020",
         "S. Maisch & T. Ropinski. Interactive Subsurface Scattering for Materials With High Scattering Distances. CGF 39(6), 2020",
     ),
@@ -113,6 +117,10 @@ pub const PAPERS: &[Paper] = &[
         "A. Tomaszewska & K. Stefanowski. Real-Time Spherical Harmonics Based Subsurface Scattering. ICIAR 2012",
     ),
     paper("Vallet2008", "B. Vallet & B. Lévy. Spectral Geometry Processing with Manifold Harmonics. CGF 27(2), 2008"),
+    paper(
+        "Veach1997",
+        "E. Veach. Robust Monte Carlo Methods for Light Transport Simulation. PhD thesis, Stanford, 1997",
+    ),
     paper("Walter2007", "B. Walter et al. Microfacet Models for Refraction through Rough Surfaces. EGSR 2007"),
     paper(
         "Walter2009",

@@ -41,11 +41,47 @@ impl Facing {
     /// What a smooth boundary does. Where the interpolated normal would send the path to the wrong side of the triangle,
     /// the triangle's own is taken, so that no energy is lost and no path is on a side that it did not cross to.
     pub fn split(&self, d: DVec3) -> Split {
+        self.split_well(d).unwrap_or_else(|| split(d, self.flat, self.eta))
+    }
+
+    /// By the interpolated normal, if that sends the path to no wrong side.
+    fn split_well(&self, d: DVec3) -> Option<Split> {
         let split = split(d, self.normal, self.eta);
         let goes_wrong = d.dot(self.normal) >= 0.0
             || split.reflected.dot(self.flat) <= 0.0
             || split.refracted.is_some_and(|r| r.dot(self.flat) >= 0.0);
-        if goes_wrong { self::split(d, self.flat, self.eta) } else { split }
+        (!goes_wrong).then_some(split)
+    }
+
+    /// The same for light, which comes from the side of the normals: directions into which a smooth boundary reflects or
+    /// refracts it, so that paths which come against them go on against `light`. Each with the share of light that those paths
+    /// get, times what turns arriving flux into flux that goes on [Veach1997, sec. 5.3]: that is 1 for a reflection where both
+    /// normals are one.
+    pub fn reversed(&self, light: DVec3, is_reflection: bool) -> [Option<(DVec3, f64)>; 2] {
+        let (side, eta) = if is_reflection { (1.0, self.eta) } else { (-1.0, 1.0 / self.eta) };
+        let seen = Facing { flat: side * self.flat, normal: side * self.normal, eta, ..*self };
+        let by = |n: DVec3, is_flat: bool| {
+            let there = split(light, n, self.eta);
+            let to = if is_reflection { there.reflected } else { there.refracted? };
+            // The path takes the one normal or the other.
+            let is_taken = light.dot(n) < 0.0 && to.dot(seen.flat) > 0.0 && seen.split_well(-to).is_none() == is_flat;
+            if !is_taken {
+                return None;
+            }
+            let reflectance = split(-to, side * n, eta).reflectance;
+            let turned = (to.dot(self.flat) / light.dot(self.flat)).abs();
+            Some(match is_reflection {
+                true => (to, reflectance * turned),
+                false => {
+                    let bent = light.dot(n) / to.dot(n) / (self.eta * self.eta);
+                    (to, (1.0 - reflectance) * turned * bent)
+                }
+            })
+        };
+        match self.normal == self.flat {
+            true => [by(self.flat, false).or_else(|| by(self.flat, true)), None],
+            false => [by(self.normal, false), by(self.flat, true)],
+        }
     }
 
     /// A normal of a rough boundary's microfacets among those that the path sees, from two numbers in [0, 1).
@@ -165,6 +201,43 @@ mod tests {
         let d = DVec3::new(0.6, 0.0, -0.8);
         let split = tilted.split(d);
         assert!(split.reflected.z > 0.0 && split.refracted.unwrap().z < 0.0);
+    }
+
+    /// Light that boundaries turn is what paths bring back that they turn: the same integral over pairs of directions from
+    /// either side, weighed by a function that has no symmetry.
+    #[test]
+    fn light_goes_the_ways_of_paths_backwards() {
+        for (eta, tilt, is_reflection) in
+            [(1.4, 0.0, false), (1.4, 0.5, false), (1.0 / 1.4, 0.5, false), (1.4, 0.7, true), (1.0 / 1.4, 0.4, true)]
+        {
+            // As light meets it.
+            let normal = DVec3::new(tilt, 0.0, 1.0).normalize();
+            let outside = Facing { normal, ..facing(eta, 0.0) };
+            let seen = match is_reflection {
+                true => outside,
+                false => Facing { flat: -DVec3::Z, normal: -normal, eta: 1.0 / eta, roughness: 0.0 },
+            };
+            let weigh = |light: DVec3, to: DVec3| 1.0 + light.x + 0.5 * to.y * light.y + 0.7 * to.x * to.x;
+            let mut random = Random::new(1, 2, 3);
+            let n = 400_000;
+            let (mut forth, mut back) = (0.0, 0.0);
+            for _ in 0..n {
+                let (z, phi) = (random.unit(), 2.0 * PI * random.unit());
+                let ring = ((1.0 - z) * (1.0 + z)).sqrt();
+                let down = DVec3::new(ring * phi.cos(), ring * phi.sin(), -z);
+                for (to, share) in outside.reversed(down, is_reflection).into_iter().flatten() {
+                    forth += z * share * weigh(down, to) / n as f64;
+                }
+                let path = if is_reflection { down } else { -down };
+                let split = seen.split(path);
+                back += match (is_reflection, split.refracted) {
+                    (true, _) => split.reflectance * z * weigh(-split.reflected, -path),
+                    (false, Some(to)) => (1.0 - split.reflectance) * z * weigh(-to, -path),
+                    (false, None) => 0.0,
+                } / n as f64;
+            }
+            assert!((forth / back - 1.0).abs() < 0.01, "{eta} {tilt} {is_reflection}: {forth} {back}");
+        }
     }
 
     /// Sampled normals and evaluated densities are two spellings of one thing; and the reflected share is the integral

@@ -107,7 +107,7 @@ impl Tracer {
             let own = density(to);
             let met = self.world.meet(point.p, to, f64::INFINITY, Some(point.place));
             let left = |lamp: &Lamp| if facing.is_smooth() { self.left_by_lobe(walk, &point, lamp) } else { 1.0 };
-            walk.add(refracted_share * self.shining_but(point.p, to, met.as_ref(), own, 0.0, left));
+            walk.add(walk.left * refracted_share * self.shining_but(point.p, to, met.as_ref(), own, 0.0, left));
             walk.lobes = None;
             let is_lit = met.is_some_and(|met| !self.is_emitter(&met));
             if is_lit && self.light == Light::Full && random.unit() < 1.0 - split.reflectance {

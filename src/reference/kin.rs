@@ -47,14 +47,14 @@ pub struct Strand {
 /// A particle from which a path flies on.
 #[derive(Clone, Copy)]
 pub(super) struct Stem {
-    p: DVec3,
+    pub p: DVec3,
     /// The direction in which the path came.
-    from: DVec3,
+    pub from: DVec3,
     /// What light is multiplied by that is scattered here.
-    weight: Rgb,
+    pub weight: Rgb,
     /// The thing in which it lies, and how many events led here. Stems are alike that have both in common: a path has one of
     /// each kind at most, so that which stems there are does not depend on what is found from them.
-    kind: (usize, u32),
+    pub kind: (usize, u32),
 }
 
 /// The particle that a path flew to.
@@ -98,6 +98,10 @@ enum Stage {
 }
 
 impl Shared {
+    pub fn is_at_find(&self) -> bool {
+        self.stage == Stage::AtFind
+    }
+
     pub fn is_at_stem(&self) -> bool {
         self.stage == Stage::AtStem
     }
@@ -161,7 +165,7 @@ impl Walk {
             .filter(|shared| shared.stage == Stage::AtFind)
             .and_then(|shared| shared.find.as_mut())
         {
-            Some(find) => find.joined.push((to, light)),
+            Some(find) => find.joined.push((to, self.weight.value * light)),
             None => self.sum.scattered += self.color * self.weight.value * phase * light,
         }
     }
@@ -189,8 +193,7 @@ impl Tracer {
     /// The thing whose stems a particle may be among.
     pub(super) fn shares(&self, walk: &Walk, medium: &Medium) -> Option<usize> {
         let is_even = |thing: &usize| self.world.strata[*thing].is_none();
-        let mean = Rgb::from_array(medium.parameter.to_array().map(|k| medium.phase.mean_cosine(k)));
-        walk.inside.only().filter(is_even).filter(|_| mean.abs().max_element() <= DIRECTED)
+        walk.inside.only().filter(is_even).filter(|_| is_shared(medium))
     }
 
     /// Gives every strand its part of what all have found.
@@ -215,7 +218,6 @@ impl Tracer {
             unreachable!("a path is in a medium where it shares")
         };
         let (sigma_t, lengths) = (medium.sigma_t(), lengths(medium));
-        let phase = |cos: f64| Rgb::from_array(medium.parameter.to_array().map(|k| medium.phase.value(-cos, k)));
         let clearance = self.world.clearance(thing, find.p);
         // Channels are drawn evenly: densities are their means.
         let (mut arriving, mut leaving) = (0.0, 0.0);
@@ -234,15 +236,15 @@ impl Tracer {
                 if !is_seen {
                     continue;
                 }
-                let spread = (-sigma_t * length).exp() * phase(stem.from.dot(to)) / (length * length);
-                let on = phase(to.dot(find.to));
+                let spread = (-sigma_t * length).exp() * medium.scattered(stem.from, to) / (length * length);
+                let on = medium.scattered(to, find.to);
                 arriving += (sigma_t * spread).element_sum() / 3.0;
                 leaving += (sigma_t * spread * on).element_sum() / 3.0;
                 ways.push((i, to, stem.weight * medium.sigma_s * spread, on));
             }
         }
         for (i, to, weight, on) in ways {
-            let joined: Rgb = find.joined.iter().map(|(lamp, light)| phase(to.dot(*lamp)) * *light).sum();
+            let joined: Rgb = find.joined.iter().map(|(lamp, light)| medium.scattered(to, *lamp) * *light).sum();
             shares[i] += weight * (joined / arriving + on * find.light / leaving);
         }
     }
@@ -262,6 +264,12 @@ impl Tracer {
             shares[i] += entry.weight / density * exit.weight * bssrdf.r_d(&exit.point, &entry.point) * light;
         }
     }
+}
+
+/// Whether paths in a medium share what they find.
+pub(super) fn is_shared(medium: &Medium) -> bool {
+    let mean = Rgb::from_array(medium.parameter.to_array().map(|k| medium.phase.mean_cosine(k)));
+    mean.abs().max_element() <= DIRECTED
 }
 
 /// How far flights go that kin share, in scene units.

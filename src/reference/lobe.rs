@@ -121,7 +121,7 @@ impl Tracer {
             }
             let own = |to| walk.density_of(phase(to));
             if let Some((to, light)) = self.through_lobe(walk, i, lamp, thing, own, random) {
-                walk.gather(to, phase(to), light);
+                walk.gather(to, phase(to), walk.left * light);
             }
         }
     }

@@ -16,6 +16,7 @@
 //! | [`world`] | the scene as rays see it |
 //! | [`path`] | a path on its way: what it lies in and what it weighs |
 //! | [`kin`] | what paths of neighbouring pixels share |
+//! | [`light_paths`] | paths that begin at lamps, and meet those from the eye |
 //! | [`film`] | means, variances, parts, tiles |
 //!
 //! Samples are added in steps that double their number; each step is a bake, named by the one before, so that what was
@@ -31,6 +32,7 @@ pub mod free_path;
 pub mod kin;
 pub mod layers;
 pub mod light;
+pub mod light_paths;
 pub mod lobe;
 pub mod path;
 pub mod random;
@@ -52,6 +54,7 @@ use glam::{DAffine3, DVec3};
 use kin::Strand;
 use layers::{Layer, Layers};
 use light::{Kind, Lamp, SkyImage};
+use light_paths::Field;
 use path::Inside;
 use random::Random;
 use rayon::prelude::*;
@@ -262,7 +265,10 @@ impl Step for BuildTracer {
         });
         let lamps = self.lamps.clone();
         let BuildTracer { light, max_depth, single, .. } = *self;
-        Ok(Tracer { world, lamps, sky, refracted, light, max_depth, single, joins: true, kin: true })
+        let mut tracer =
+            Tracer { world, lamps, sky, refracted, light, max_depth, single, joins: true, kin: true, field: None };
+        tracer.field = Field::new(&tracer, light_paths::PATHS);
+        Ok(tracer)
     }
 }
 
@@ -280,6 +286,13 @@ struct Trace {
     /// From and up to.
     samples: (u64, u64),
     before: Option<Slot<Film>>,
+}
+
+/// Pixels whose paths are kin.
+struct Block {
+    /// Each one's place in the film, and in the picture.
+    pixels: Vec<(usize, u32, u32)>,
+    moments: Vec<Moments>,
 }
 
 impl Step for Trace {
@@ -302,20 +315,24 @@ impl Step for Trace {
         let inside = around(&tracer.world, self.camera.eye);
         // The paths of a block are kin; which block a pixel lies in is the same for every tile.
         let rows: Vec<u32> = film.rows().collect();
-        let blocks: Vec<(usize, u32)> = (0..rows.len())
+        let corners = (0..rows.len())
             .step_by(kin::SIDE as usize)
-            .flat_map(|row| (0..width).step_by(kin::SIDE as usize).map(move |x| (row, x)))
-            .collect();
-        let done = AtomicUsize::new(0);
-        let trace = |&(row, x): &(usize, u32)| {
+            .flat_map(|row| (0..width).step_by(kin::SIDE as usize).map(move |x| (row, x)));
+        let pixels = |(row, x): (usize, u32)| -> Vec<(usize, u32, u32)> {
             let rows = rows.iter().enumerate().skip(row).take(kin::SIDE as usize);
-            let pixels: Vec<(usize, u32, u32)> = rows
-                .flat_map(|(row, y)| {
-                    (x..width.min(x + kin::SIDE)).map(move |x| (row * width as usize + x as usize, x, *y))
-                })
-                .collect();
-            let mut moments = vec![Moments::default(); pixels.len()];
-            for sample in self.samples.0..self.samples.1 {
+            let across = x..width.min(x + kin::SIDE);
+            rows.flat_map(|(row, y)| across.clone().map(move |x| (row * width as usize + x as usize, x, *y))).collect()
+        };
+        let mut blocks: Vec<Block> = corners
+            .map(|corner| {
+                let pixels = pixels(corner);
+                Block { moments: vec![Moments::default(); pixels.len()], pixels }
+            })
+            .collect();
+        let (done, all) = (AtomicUsize::new(0), blocks.len() * (self.samples.1 - self.samples.0) as usize);
+        for sample in self.samples.0..self.samples.1 {
+            let lit = tracer.light_paths(self.seed, sample);
+            blocks.par_iter_mut().try_for_each(|Block { pixels, moments }| {
                 let path = |&(_, x, y): &(usize, u32, u32)| {
                     let mut random = Random::new(self.seed, y as u64 * width as u64 + x as u64, sample);
                     let (a, b) = random.pair();
@@ -323,20 +340,20 @@ impl Step for Trace {
                 };
                 let mut strands: Vec<Strand> = pixels.iter().map(path).collect();
                 tracer.settle(&mut strands);
-                strands
-                    .iter()
-                    .zip(&mut moments)
-                    .for_each(|(strand, moments)| moments.add(&strand.parts, strand.is_object));
-            }
-            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            run.tick(done as f64 / blocks.len() as f64)?;
-            let pixel = |(moments, (place, ..)): (Moments, &(usize, u32, u32))| {
-                (*place, moments.pixel(before.as_ref().map(|film| (&film.pixels[*place], film.samples))))
-            };
-            Ok(moments.into_iter().zip(&pixels).map(pixel).collect())
-        };
-        let traced: Vec<Vec<(usize, film::Pixel)>> = blocks.par_iter().map(trace).collect::<Result<_, Problem>>()?;
-        traced.into_iter().flatten().for_each(|(place, pixel)| film.pixels[place] = pixel);
+                if let (Some(lit), Some((_, x, y))) = (&lit, pixels.first()) {
+                    // A stream that no pixel has, nor light path.
+                    let block = u64::MAX / 2 - (*y as u64 * width as u64 + *x as u64);
+                    tracer.meet_light(&mut strands, lit, &mut Random::new(self.seed, block, sample));
+                }
+                let found = strands.iter().zip(moments.iter_mut());
+                found.for_each(|(strand, moments)| moments.add(&strand.parts, strand.is_object));
+                run.tick((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / all as f64)
+            })?;
+        }
+        let traced = blocks.iter().flat_map(|block| block.pixels.iter().map(|p| p.0).zip(&block.moments));
+        for (place, moments) in traced {
+            film.pixels[place] = moments.pixel(before.as_ref().map(|film| (&film.pixels[place], film.samples)));
+        }
         Ok(film)
     }
 }

@@ -109,6 +109,8 @@ pub struct Walk {
     pub struck: bool,
     pub depth: u32,
     pub sum: Sum,
+    /// Of the light that comes from lamps by ways that [light paths](super::light_paths) take too, the share that this path brings.
+    pub left: f64,
     /// What kin may share of it.
     pub shared: Option<Shared>,
 }

@@ -33,7 +33,7 @@ fn tracer(things: Vec<(Mesh, Matter)>, lamps: Vec<Lamp>, sky: Option<f64>, light
     };
     let refracted = lamps.iter().enumerate().flat_map(beams).collect();
     let sky = sky.map(|radiance| light::Sky { scale: Rgb::splat(radiance), image: None, shadow: true });
-    Tracer { world, lamps, sky, refracted, light, max_depth, single: false, joins: true, kin: false }
+    Tracer { world, lamps, sky, refracted, light, max_depth, single: false, joins: true, field: None, kin: false }
 }
 
 /// A square light at a height, of a half-edge, that shines down; and its mesh.
@@ -295,4 +295,5 @@ fn nothing_is_lost_between_white_surfaces() {
 mod bssrdf;
 mod kin;
 mod layers;
+mod light_paths;
 mod single;

@@ -12,6 +12,7 @@
 use super::free_path::End;
 use super::kin::{self, Exit, Shared, Strand};
 use super::light::{Kind, Lamp, Ray, Sky};
+use super::light_paths::Field;
 use super::path::{Inside, Sum, Walk, Weight};
 use super::random::Random;
 use super::refracted::Refracted;
@@ -46,6 +47,8 @@ pub struct Tracer {
     pub joins: bool,
     /// Whether paths leave their finds to their kin. Without, likewise.
     pub kin: bool,
+    /// Where paths leave their finds to light paths. Without, likewise.
+    pub field: Option<Field>,
 }
 
 impl Tracer {
@@ -122,7 +125,14 @@ impl Tracer {
         }
     }
 
-    fn start(&self, origin: DVec3, direction: DVec3, on: Option<Place>, inside: Inside, random: &mut Random) -> Walk {
+    pub(super) fn start(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        on: Option<Place>,
+        inside: Inside,
+        random: &mut Random,
+    ) -> Walk {
         Walk {
             origin,
             direction,
@@ -140,6 +150,7 @@ impl Tracer {
             struck: false,
             depth: 0,
             sum: Sum::default(),
+            left: 1.0,
             shared: None,
         }
     }
@@ -234,7 +245,7 @@ impl Tracer {
             };
             if walk.inside.is_nothing() && !std::mem::replace(&mut walk.counted, false) {
                 let met = flight.end.surface();
-                walk.add(self.shining(walk.origin, walk.direction, met, walk.density, walk.passed));
+                walk.add(walk.left * self.shining(walk.origin, walk.direction, met, walk.density, walk.passed));
             }
             if walk.depth >= self.max_depth {
                 return walk;
@@ -244,6 +255,9 @@ impl Tracer {
             match flight.end {
                 End::Surface(point) => {
                     walk.below = None;
+                    if !self.field.as_ref().is_some_and(|field| field.is_passed(point.thing())) {
+                        walk.left = 1.0;
+                    }
                     if let Some(shared) = &mut walk.shared {
                         shared.pass_surface();
                     }
@@ -254,7 +268,9 @@ impl Tracer {
                 }
                 End::Particle(p, medium, below) => {
                     (walk.origin, walk.on, walk.below) = (p, None, below);
-                    self.scatter(&mut walk, medium, random);
+                    if !self.scatter(&mut walk, medium, random) {
+                        return walk;
+                    }
                 }
                 End::Away => return walk,
             }
@@ -269,16 +285,18 @@ impl Tracer {
         }
     }
 
-    /// A path meets a medium's particle: light that is scattered there, and the way on.
-    fn scatter(&self, walk: &mut Walk, medium: &Medium, random: &mut Random) {
+    /// A path meets a medium's particle: light that is scattered there, and the way on; whether it goes on.
+    fn scatter(&self, walk: &mut Walk, medium: &Medium, random: &mut Random) -> bool {
         (walk.scattered, walk.struck) = (true, true);
         if walk.shared.as_ref().is_some_and(Shared::is_open) {
             walk.share(self.shares(walk, medium), kin::lengths(medium), random);
+            if walk.shared.as_ref().is_some_and(Shared::is_at_find) && !self.leave(walk, random) {
+                return false;
+            }
         }
         let from = walk.direction;
         // Channels may scatter differently: the direction is drawn for the hero, and weighs like a free path.
-        let phase =
-            |to: DVec3| Rgb::from_array(medium.parameter.to_array().map(|k| medium.phase.value(-from.dot(to), k)));
+        let phase = |to: DVec3| medium.scattered(from, to);
         self.join_lamps(walk, |lamp| self.is_joined(lamp), phase, random);
         let refracts = walk.inside.only().is_some_and(|thing| self.world.things[thing].refracts());
         if let Some((ray, shadow)) = self.sky_sample(random).filter(|_| !refracts) {
@@ -292,6 +310,7 @@ impl Tracer {
         let to = around(from, -medium.phase.sample(random.unit(), parameter), random.unit());
         (walk.joined_through, walk.passed) = (true, 0.0);
         walk.go(to, phase(to));
+        true
     }
 
     /// Adds the light of lamps at a vertex in a medium, `phase` being the share that goes on along the path, 1/sr.
@@ -309,7 +328,7 @@ impl Tracer {
                 let luck = random.exponential();
                 let through = |to, length| fill.transmittance(p, below, to, length, random);
                 refracted.each(&self.world, p, lamp.shadow, (fill.thinnest(), luck), through, |to, light| {
-                    walk.gather(to, phase(to), light);
+                    walk.gather(to, phase(to), walk.left * light);
                 });
             }
             if walk.inside.only().is_some_and(|thing| self.is_behind_glass(lamp, thing)) {

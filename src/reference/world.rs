@@ -51,6 +51,11 @@ impl Medium {
     pub fn sigma_t(&self) -> Rgb {
         self.sigma_a + self.sigma_s
     }
+
+    /// The share of a path's light that comes, scattered, by a direction in which the path goes on, 1/sr.
+    pub fn scattered(&self, from: DVec3, to: DVec3) -> Rgb {
+        Rgb::from_array(self.parameter.to_array().map(|k| self.phase.value(-from.dot(to), k)))
+    }
 }
 
 pub struct Thing {
