@@ -18,7 +18,7 @@ const SIGNED: [(&str, &str); 14] = [
     ("profile.disk_means", "logarithms"),
     ("screen.sums", "places"),
     ("long_range.splats", "places and normals"),
-    ("long_range.far", "the pixel that a block's light is for, -1 for none, beside the light"),
+    ("long_range.far", "which pixel a block's light is for and how often it counts, -1 for none, beside the light"),
     ("sky.light", "directions, beside the light from there"),
     ("sky.lamps", "directions, likewise"),
     ("layered.", "planes, and slopes of maps"),

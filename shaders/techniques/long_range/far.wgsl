@@ -26,7 +26,8 @@ fn spiral(i: u32) -> vec2u {
     return vec2u(order[i] & 3u, order[i] >> 2u);
 }
 
-// Where the block's pixel lies in eye space, and its place in the picture, -1 for none.
+// Where the block's pixel lies in eye space; then which of the 16 it is, and 16 times how many of the others show the object.
+// -1 for none.
 var<workgroup> receiver: vec4f;
 var<workgroup> sums: array<vec3f, LANES>;
 
@@ -34,17 +35,24 @@ fn find_receiver(block: u32) -> vec4f {
     let size = textureDimensions(position_map);
     let wide = (size.x + BLOCK - 1u) / BLOCK;
     let corner = BLOCK * vec2u(block % wide, block / wide);
+    var found = vec4f(vec3f(0.0), -1.0);
     for (var k = 0u; k < 16u; k++) {
-        let at = corner + spiral(k);
+        let step = spiral(k);
+        let at = corner + step;
         if any(at >= size) {
             continue;
         }
         let position = textureLoad(position_map, at, 0);
-        if u32(position.w) == whose.object + 1u {
-            return vec4f(position.xyz, f32(at.y * size.x + at.x));
+        if u32(position.w) != whose.object + 1u {
+            continue;
+        }
+        if found.w < 0.0 {
+            found = vec4f(position.xyz, f32(step.y * BLOCK + step.x));
+        } else {
+            found.w += 16.0;
         }
     }
-    return vec4f(vec3f(0.0), -1.0);
+    return found;
 }
 
 fn from_splat(splat: Splat, x: vec3f, reach: f32) -> vec3f {
