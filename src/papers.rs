@@ -48,6 +48,10 @@ pub const PAPERS: &[Paper] = &[
         "H. Edelsbrunner & E. Mücke. Simulation of Simplicity: A Technique to Cope with Degenerate Cases. ACM TOG 9(1), 1990",
     ),
     paper(
+        "Ericsson1980",
+        "T. Ericsson & A. Ruhe. The Spectral Transformation Lanczos Method for the Numerical Solution of Large Sparse Generalized Symmetric Eigenvalue Problems. Mathematics of Computation 35, 1980",
+    ),
+    paper(
         "Felzenszwalb2012",
         "P. Felzenszwalb & D. Huttenlocher. Distance Transforms of Sampled Functions. Theory of Computing 8(19), 2012",
     ),

@@ -16,7 +16,7 @@
 //! | [`sh`] | real spherical harmonics and what convolution does to them |
 //! | [`strata`] | how much light layers over a half space send back |
 //! | [`slab`] | how much light comes out behind a slab |
-//! | [`quadrature`] | Gauss-Legendre rules, plain and graded towards a singular end, and a double exponential one |
+//! | [`quadrature`] | Gauss-Legendre rules, plain and crowded at an end or a peak, and a double exponential one |
 
 pub mod fresnel;
 pub mod half_space;

@@ -27,6 +27,27 @@ impl Phase {
         }
     }
 
+    /// The integral of [`Phase::value`] over the azimuth between two directions that are these angles off one axis, 1/rad:
+    /// what scatters from the one cone into the other. In closed form, so that no peak falls between samples.
+    pub fn around(self, from: f64, to: f64, parameter: f64) -> f64 {
+        // Both functions are powers of a + b cos(azimuth), of which these are the least and the most.
+        let k = parameter.abs();
+        let half = 0.5 * if parameter < 0.0 { from - to } else { from + to - PI };
+        let sines = from.sin() * to.sin();
+        match self {
+            Phase::HenyeyGreenstein => {
+                let least = (1.0 - k) * (1.0 - k) + 4.0 * k * half.sin().powi(2);
+                let most = least + 4.0 * k * sines;
+                (1.0 - k) * (1.0 + k) / PI * elliptic_e(least / most) / (least * most.sqrt())
+            }
+            Phase::Schlick => {
+                let least = 1.0 - k + 2.0 * k * half.sin().powi(2);
+                let most = least + 2.0 * k * sines;
+                0.25 * (1.0 - k) * (1.0 + k) * (least + most) / (least * most).powf(1.5)
+            }
+        }
+    }
+
     /// A cosine for `u` in [0, 1] with the density 2 pi [`Phase::value`], growing with u. It is that of this module: light
     /// that travelled along omega goes on at the cosine -`sample` to omega.
     pub fn sample(self, u: f64, parameter: f64) -> f64 {
@@ -111,10 +132,24 @@ pub fn schlick_parameter(g: f64) -> f64 {
     k.copysign(g)
 }
 
+/// The complete elliptic integral of the second kind, E = ∫ sqrt(1 - m sin²) over a quarter turn, for 1 - m in (0, 1]: by
+/// the arithmetic-geometric mean.
+fn elliptic_e(one_less_m: f64) -> f64 {
+    let (mut a, mut b) = (1.0, one_less_m.sqrt());
+    let (mut sum, mut power) = (0.5 * (1.0 - one_less_m), 1.0);
+    while a - b > 1e-15 * a {
+        let c = 0.5 * (a - b);
+        (a, b) = (0.5 * (a + b), (a * b).sqrt());
+        sum += power * c * c;
+        power *= 2.0;
+    }
+    0.5 * PI / a * (1.0 - sum)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::optics::quadrature::{gauss_legendre, integrate};
+    use crate::optics::quadrature::{gauss_legendre, halving, integrate};
     use proptest::prelude::*;
 
     #[test]
@@ -178,6 +213,33 @@ mod tests {
                 assert!(right.abs() < 5.0, "{phase:?} {parameter}: {right}");
                 let wrong = chi_square(100_000, &edges, share(parameter), |u| phase.sample(u, 0.9 * parameter - 0.05));
                 assert!(wrong > 5.0, "{phase:?} {parameter}: {wrong}");
+            }
+        }
+    }
+
+    #[test]
+    fn around_an_axis_it_is_the_integral_over_turns_and_loses_nothing_of_any_peak() {
+        let turns = gauss_legendre(400, 0.0, PI);
+        for phase in [Phase::HenyeyGreenstein, Phase::Schlick] {
+            for parameter in [-0.95, -0.4, 0.0, 0.7, 0.95f64] {
+                for (from, to) in [(0.0, 0.3), (0.4, 0.4), (0.4, 2.7), (1.5, 1.6), (1.2, 0.1)] {
+                    let (sines, cosines) = (f64::sin(from) * f64::sin(to), f64::cos(from) * f64::cos(to));
+                    let sum = 2.0 * integrate(&turns, |turn| phase.value(cosines + sines * turn.cos(), parameter));
+                    let found = phase.around(from, to, parameter);
+                    assert!((found / sum - 1.0).abs() < 1e-8, "{phase:?} {parameter} {from} {to}: {found} {sum}");
+                }
+            }
+            // All that scatters goes somewhere.
+            for parameter in [-1.0 + 1e-10, -0.9999, -0.5, 0.0, 0.5, 0.9999, 1.0 - 1e-10] {
+                for from in [0.0, 1e-3, 0.7, 0.5 * PI] {
+                    let peak = if parameter < 0.0 { from } else { PI - from };
+                    let all: f64 = [0.0, PI]
+                        .iter()
+                        .flat_map(|far| halving(peak, *far, 1.0 - f64::abs(parameter)))
+                        .map(|(to, weight)| weight * to.sin() * phase.around(from, to, parameter))
+                        .sum();
+                    assert!((all - 1.0).abs() < 1e-5, "{phase:?} {parameter} {from}: {all}");
+                }
             }
         }
     }

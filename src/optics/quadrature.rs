@@ -1,4 +1,5 @@
-//! Rules of quadrature as lists of (node, weight): Gauss-Legendre on an interval, double exponential on the half line.
+//! Rules of quadrature as lists of (node, weight): Gauss-Legendre on an interval, plain or crowded at an end, double
+//! exponential on the half line.
 
 use gauss_quad::legendre::GaussLegendre;
 use std::num::NonZeroUsize;
@@ -14,6 +15,23 @@ pub fn gauss_legendre(n: usize, a: f64, b: f64) -> Vec<(f64, f64)> {
 /// square root, a logarithm or a branch point near there converge as fast as smooth ones. Panics when `n` is 0.
 pub fn graded(n: usize, a: f64, b: f64) -> Vec<(f64, f64)> {
     gauss_legendre(n, 0.0, 1.0).into_iter().map(|(s, w)| (a + (b - a) * s.powi(3), 3.0 * (b - a) * s * s * w)).collect()
+}
+
+/// A rule on the interval between `peak` and `far`, whichever is larger, for integrands with a peak at the one as narrow as
+/// `width`, above 0: Gauss-Legendre on pieces of it, each half as long as the one beside it, down to that width. A
+/// Lorentzian, and what is as smooth at each distance from its peak, is summed to 1e-9.
+pub fn halving(peak: f64, far: f64, width: f64) -> Vec<(f64, f64)> {
+    let unit = gauss_legendre(12, 0.0, 1.0);
+    let (mut outer, mut rule) = (far - peak, Vec::new());
+    loop {
+        let inner = if outer.abs() > width { 0.5 * outer } else { 0.0 };
+        let length = outer - inner;
+        rule.extend(unit.iter().map(|(s, w)| (peak + inner + s * length, w * length.abs())));
+        if inner == 0.0 {
+            return rule;
+        }
+        outer = inner;
+    }
 }
 
 /// A rule on [0, ∞) for integrands that fall to nothing by `end`, whatever they do at 0 (a root, a logarithm, no end of
@@ -72,6 +90,22 @@ mod tests {
             check(sum, 0.5 * std::f64::consts::PI);
         }
         assert!(double_exponential(1.0, 50.0).count() < 40);
+    }
+
+    #[test]
+    fn a_halving_rule_takes_a_peak_of_any_width_from_either_side() {
+        let lorentzian = |width: f64| move |x: f64| width / (width * width + (x - 1.0) * (x - 1.0));
+        for width in [1e-12f64, 1e-4, 0.3, 7.0] {
+            let error = |detail, far: f64| {
+                let exact = ((far - 1.0).abs() / width).atan();
+                (integrate(&halving(1.0, far, detail), lorentzian(width)) / exact - 1.0).abs()
+            };
+            // Places beside 1 are known to 1e-16.
+            let bound = 1e-9 + 1e-16 / width;
+            assert!(error(width, 3.0) < bound && error(width, 0.2) < bound, "{width}: {}", error(width, 3.0));
+            assert!(width > 0.2 || error(1.0, 3.0) > 1e-5, "{width} {}", error(1.0, 3.0));
+        }
+        assert_eq!(integrate(&halving(0.5, 0.5, 0.1), |_| 1.0), 0.0);
     }
 
     #[test]

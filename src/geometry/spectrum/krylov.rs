@@ -154,13 +154,9 @@ impl Projected<'_> {
 
     /// Adds what a solve makes of the last block. False when that is nothing new: the space is whole.
     fn grow(&mut self, factor: &Factor) -> bool {
-        let (first, root) = (self.size(), &self.space.root);
-        let mut block =
-            Mat::from_fn(root.len(), first - self.last, |i, c| self.space.column(self.last + c)[i] * root[i]);
-        factor.solve(block.as_mut());
-        for c in 0..block.ncols() {
-            block.col_as_slice_mut(c).iter_mut().zip(root).for_each(|(v, root)| *v *= root);
-        }
+        let first = self.size();
+        let mut block = self.space.columns().subcols(self.last, first - self.last).to_owned();
+        self.space.invert(factor, &mut block);
         self.space.extend(block, None);
         self.last = first;
         self.project(first);

@@ -3,6 +3,7 @@
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 
+use super::factor::Factor;
 use crate::geometry::laplacian::Laplacian;
 
 /// A column with less than this share of new direction brings none.
@@ -92,7 +93,7 @@ impl<'a> Space<'a> {
     }
 
     /// Takes out of a column what is constant on each component: rounding brings it in, and solves favour it.
-    fn without_means(&self, column: &mut [f64]) {
+    pub fn without_means(&self, column: &mut [f64]) {
         let component = &self.laplacian.component;
         let mut sums = vec![(0.0, 0.0); self.laplacian.components()];
         for ((&c, root), v) in component.iter().zip(&self.root).zip(column.iter()) {
@@ -101,6 +102,19 @@ impl<'a> Space<'a> {
         }
         for ((&c, root), v) in component.iter().zip(&self.root).zip(column) {
             *v -= root * sums[c as usize].0 / sums[c as usize].1;
+        }
+    }
+
+    /// What the inverse of S - shift A, of which this is the factor, makes of columns.
+    pub fn invert(&self, factor: &Factor, columns: &mut Mat<f64>) {
+        self.times_root(columns);
+        factor.solve(columns.as_mut());
+        self.times_root(columns);
+    }
+
+    fn times_root(&self, columns: &mut Mat<f64>) {
+        for c in 0..columns.ncols() {
+            columns.col_as_slice_mut(c).iter_mut().zip(&self.root).for_each(|(v, root)| *v *= root);
         }
     }
 
