@@ -19,6 +19,10 @@ pub const PAPERS: &[Paper] = &[
         "Bekaert2002",
         "P. Bekaert, M. Sbert & J. Halton. Accelerating Path Tracing by Re-Using Paths. Eurographics Workshop on Rendering 2002",
     ),
+    paper(
+        "Bobenko2007",
+        "A. Bobenko & B. Springborn. A Discrete Laplace-Beltrami Operator for Simplicial Surfaces. DCG 38(4), 2007",
+    ),
     paper("Botsch2004", "M. Botsch & L. Kobbelt. A Remeshing Approach to Multiresolution Modeling. SGP 2004"),
     paper("Chandrasekhar1960", "S. Chandrasekhar. Radiative Transfer. Dover, 1960"),
     paper(

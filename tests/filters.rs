@@ -2,11 +2,6 @@
 
 mod studio;
 
-use diaphane::geometry::laplacian::Areas;
-use diaphane::geometry::mesh::Mesh;
-use diaphane::geometry::shapes;
-use diaphane::geometry::spectrum::harmonic_normals;
-use diaphane::geometry::spectrum::kernel::Kernel;
 use diaphane::image::Image;
 use std::sync::Arc;
 use studio::{Studio, mean, most_apart, share_apart, studio};
@@ -148,28 +143,4 @@ fn triangles_are_not_seen_at_the_edge_of_a_shadow() {
     let apart = share_apart(&coarse, &fine, 0.25 * mean(&fine));
     println!("{apart:.4} of the pixels are apart");
     assert!(apart < 0.01, "{apart}");
-}
-
-/// On a sphere frequencies are repeated, and every order of the vertices finds other waves of the same ones.
-#[test]
-fn any_waves_of_a_repeated_frequency_make_the_same_field() {
-    let mesh = shapes::sphere(1.0, 3);
-    let n = mesh.positions.len() as u32;
-    let step = [7, 11, 13, 17].into_iter().find(|step| !n.is_multiple_of(*step)).expect("n is small");
-    let to = |v: u32| (step * v + 3) % n;
-    let mut shuffled = Mesh { uvs: vec![], ..mesh.clone() };
-    for v in 0..n {
-        shuffled.positions[to(v) as usize] = mesh.positions[v as usize];
-        shuffled.normals[to(v) as usize] = mesh.normals[v as usize];
-    }
-    shuffled.triangles = mesh.triangles.iter().rev().map(|t| t.map(to)).collect();
-    let found = [&mesh, &shuffled]
-        .map(|mesh| harmonic_normals(mesh, Areas::VertexArea, f64::MAX, &|_| Ok(())).expect("it has pairs"));
-    // Kernels that begin to fall where frequencies are repeated: sqrt(2) and sqrt(6) on a sphere of radius 1.
-    for kernel in [Kernel::Gaussian { width: 0.4 }, Kernel::Box { wavelength: std::f64::consts::TAU / 2.0 }] {
-        let [here, there] = found.each_ref().map(|basis| basis.filter(&kernel, 1.0));
-        let apart = (0..n).map(|v| here[v as usize].distance(there[to(v) as usize])).fold(0.0, f32::max);
-        println!("{n} vertices, {kernel:?}: {apart:.1e}");
-        assert!(apart < 1e-4, "{kernel:?}: {apart}");
-    }
 }

@@ -148,6 +148,21 @@ fn an_edit_of_a_kernel_runs_one_pass_over_the_vertices_and_no_bake() {
     assert_eq!(all.steps().iter().filter(|step| step.name == "frame.environment").count(), 4, "three, and the floor's");
 }
 
+#[test]
+fn a_kernel_that_lets_everything_pass_needs_no_modes() {
+    let neighbours = "Neighbours(sigma_tr: 0.5, radius: 4, alpha: 0.3, weights: Area, length: Keep)";
+    let steps = |width: &str, technique: &str| {
+        let desk = Desk::new(&BALL.replace(neighbours, &format!("Gaussian(width: {width})")));
+        let plan = desk.plan(&[("view.technique", technique)]);
+        plan.steps().iter().filter(|step| step.name.starts_with("filtered_normals.")).count()
+    };
+    for technique in ["FilteredNormals()", "FilteredNormals(engine: Harmonics)", "FilteredNormals(signal: Irradiance)"]
+    {
+        assert_eq!(steps("0", technique), 0, "{technique}");
+        assert!(steps("(0, 0, 0.1)", technique) > 0, "{technique}");
+    }
+}
+
 /// A scene with one of everything, and its material, both to be edited.
 const SCENE: &str = r#"Scene(
     version: 1,

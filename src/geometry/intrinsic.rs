@@ -1,11 +1,18 @@
-//! A triangulation that knows its edges' lengths and not where its corners are, made fit for cotangents: mollified, then
-//! flipped until it is Delaunay [Sharp2020].
+//! A triangulation that knows its edges' lengths and not where its corners are, made fit for cotangents: mollified, doubled
+//! where it has borders, then flipped until it is Delaunay [Sharp2020].
 //!
 //! Scans bring triangles whose angles f32 cannot tell from 0. Adding the same tiny length to every edge of a component
 //! makes the worst of them a proper triangle (mollification: 1e-5 of the component's mean edge at most); flipping edges
 //! within the surface, which stays as it is, then leaves no two angles across an edge that add up to more than 180
-//! degrees. Edges of one triangle or of more than two stay where they are, and so do those that a one-sided surface
-//! passes with its sides exchanged.
+//! degrees.
+//!
+//! Where they add up to just that, either diagonal will do, and rounding or the order of the triangles says which. So nothing
+//! may be asked of it that depends on that: not a third of a triangle's area, but what lies nearest to each of its corners
+//! ([`Intrinsic::nearest`]), which is the surface's own, as its cotangents are [Bobenko2007].
+//!
+//! An edge of one triangle or of more than two has nothing to be flipped with, nor has one that a one-sided surface passes
+//! with its sides exchanged. A surface that has such edges becomes a thing of two sheets, front and back, which hang
+//! together there; the rest of it does too, so that each sheet stands for half.
 
 /// No triangle lies across: a border, an edge of many triangles, or one where sides are exchanged.
 const NONE: u32 = u32::MAX;
@@ -13,10 +20,15 @@ const NONE: u32 = u32::MAX;
 /// How much longer than the third edge two edges of a triangle have to be together, of the component's mean edge.
 const SLACK: f64 = 1e-5;
 
+/// Two angles across an edge are as good as 180 degrees together if the sum of their cotangents is this near to 0.
+const UNDECIDED: f64 = 1e-10;
+
 /// Triangles with the lengths of their edges. Side i of a triangle runs from its corner i to the next one.
 pub(super) struct Intrinsic {
     pub corners: Vec<[u32; 3]>,
     pub lengths: Vec<[f64; 3]>,
+    /// How often each piece of the surface is there: twice, if it has borders.
+    pub sheets: f64,
     /// For each side (3 t + i) the one across.
     across: Vec<u32>,
 }
@@ -24,10 +36,16 @@ pub(super) struct Intrinsic {
 impl Intrinsic {
     /// From triangles that have three different corners each, the lengths of their sides, and their components.
     pub fn new(corners: Vec<[u32; 3]>, lengths: Vec<[f64; 3]>, component: &[u32]) -> Intrinsic {
-        let mut intrinsic = Intrinsic { across: vec![NONE; 3 * corners.len()], corners, lengths };
-        intrinsic.glue();
+        let mut intrinsic = Intrinsic::glued(corners, lengths);
         intrinsic.mollify(component);
+        intrinsic.close();
         intrinsic.flip_to_delaunay();
+        intrinsic
+    }
+
+    fn glued(corners: Vec<[u32; 3]>, lengths: Vec<[f64; 3]>) -> Intrinsic {
+        let mut intrinsic = Intrinsic { across: vec![NONE; 3 * corners.len()], corners, lengths, sheets: 1.0 };
+        intrinsic.glue();
         intrinsic
     }
 
@@ -74,11 +92,10 @@ impl Intrinsic {
                 }
             }
         }
-        // A turned triangle a b c is a c b: its sides in reverse.
         let is_turned = |t: usize| turned[t] == Some(true);
         let place = |side: u32| match side {
             NONE => NONE,
-            side if is_turned(side as usize / 3) => side - side % 3 + (2 - side % 3),
+            side if is_turned(side as usize / 3) => mirrored(side),
             side => side,
         };
         let before = std::mem::take(&mut self.across);
@@ -90,6 +107,24 @@ impl Intrinsic {
             self.corners[t].swap(1, 2);
             self.lengths[t].reverse();
         }
+    }
+
+    /// Adds a back to a surface with borders, of the same triangles turned over, and joins both there.
+    fn close(&mut self) {
+        if !self.across.contains(&NONE) {
+            return;
+        }
+        let front = self.across.clone();
+        let behind = |side: u32| front.len() as u32 + mirrored(side);
+        self.corners.extend(self.corners.clone().into_iter().map(|[a, b, c]| [a, c, b]));
+        self.lengths.extend(self.lengths.clone().into_iter().map(|[ab, bc, ca]| [ca, bc, ab]));
+        self.across.resize(2 * front.len(), NONE);
+        for (side, &other) in (0..).zip(&front) {
+            let (here, there) = if other == NONE { (behind(side), side) } else { (other, behind(other)) };
+            self.across[side as usize] = here;
+            self.across[behind(side) as usize] = there;
+        }
+        self.sheets = 2.0;
     }
 
     fn ends(&self, side: usize) -> (u32, u32) {
@@ -128,7 +163,7 @@ impl Intrinsic {
                 continue;
             }
             let (here, there) = (self.cotangent(side as usize), self.cotangent(other as usize));
-            if here + there < -1e-10 * (here.abs() + there.abs())
+            if here + there < -UNDECIDED * (1.0 + here.abs() + there.abs())
                 && let Some(outer) = self.flip(side, other)
             {
                 left -= 1;
@@ -146,6 +181,14 @@ impl Intrinsic {
 
     pub fn area(&self, t: usize) -> f64 {
         area(&self.lengths[t])
+    }
+
+    /// Of what lies nearest to each corner of a triangle, the area, if all around it is Delaunay: that is what the lines to the
+    /// middle of its circumcircle cut off. Of an obtuse triangle, some is another's, and counts as negative. All three add
+    /// up to its area.
+    pub fn nearest(&self, t: usize) -> [f64; 3] {
+        let along = [0, 1, 2].map(|i| self.lengths[t][i].powi(2) * self.cotangent(3 * t + i) / 8.0);
+        [along[0] + along[2], along[1] + along[0], along[2] + along[1]]
     }
 
     /// Exchanges the edge a b between the triangles a b c and b a d for c d, and tells the four sides around the two.
@@ -192,6 +235,11 @@ impl Intrinsic {
     }
 }
 
+/// The place of a side in its triangle turned over: a b c becomes a c b, its sides in reverse.
+fn mirrored(side: u32) -> u32 {
+    side - side % 3 + (2 - side % 3)
+}
+
 /// By Heron, in the order of operations that keeps its digits for needles; 0 for what is no triangle.
 fn area(lengths: &[f64; 3]) -> f64 {
     let mut sorted = *lengths;
@@ -230,6 +278,37 @@ mod tests {
     }
 
     #[test]
+    fn what_is_nearest_to_a_corner_is_the_same_by_either_diagonal() {
+        type Corners = [(f64, f64); 4];
+        // Both on a circle.
+        let rectangle = [(0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (0.0, 1.0)];
+        let trapezoid = [(0.0, 0.0), (4.0, 0.0), (3.0, 1.0), (1.0, 1.0)];
+        let areas = |at: Corners, triangles: [[u32; 3]; 2], by: fn(&Intrinsic, usize) -> [f64; 3]| {
+            let length = |i: u32, j: u32| {
+                let (a, b) = (at[i as usize], at[j as usize]);
+                (a.0 - b.0).hypot(a.1 - b.1)
+            };
+            let lengths = triangles.map(|[a, b, c]| [length(a, b), length(b, c), length(c, a)]);
+            let found = Intrinsic::new(triangles.to_vec(), lengths.to_vec(), &[0; 4]);
+            let mut areas = [0.0; 4];
+            for (t, corners) in found.corners.iter().enumerate() {
+                corners.iter().zip(by(&found, t)).for_each(|(&v, area)| areas[v as usize] += area / found.sheets);
+            }
+            assert!(
+                (areas.iter().sum::<f64>() - 3.0).abs() < 1e-9 && areas.iter().all(|area| *area > 0.1),
+                "{areas:?}"
+            );
+            areas
+        };
+        let apart = |at, by| {
+            let [a, b] = [[[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]].map(|triangles| areas(at, triangles, by));
+            a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
+        assert!(apart(rectangle, Intrinsic::nearest) < 1e-9 && apart(trapezoid, Intrinsic::nearest) < 1e-9);
+        assert!(apart(rectangle, |found, t| [found.area(t) / 3.0; 3]) > 0.1, "thirds are not");
+    }
+
+    #[test]
     fn flat_triangles_become_proper_ones_and_others_stay() {
         // The middle of an edge is a corner of a triangle without area.
         let flat = Intrinsic::new(vec![[0, 1, 2]], vec![[0.5, 0.5, 1.0]], &[0; 3]);
@@ -240,17 +319,24 @@ mod tests {
 
     #[test]
     fn triangles_are_turned_to_agree_and_a_one_sided_band_is_cut() {
-        let agree = Intrinsic::new(vec![[0, 1, 2], [0, 1, 3]], vec![[1.0; 3]; 2], &[0; 4]);
+        let agree = Intrinsic::glued(vec![[0, 1, 2], [0, 1, 3]], vec![[1.0; 3]; 2]);
         assert!(agree.across.iter().filter(|s| **s != NONE).count() == 2);
         let (a, b) = (agree.ends(0), agree.ends(agree.across[0] as usize));
         assert_eq!((a.0, a.1), (b.1, b.0));
         // A band of five triangles whose ends are joined with a half turn.
         let band: Vec<[u32; 3]> = (0..5).map(|i| [i, (i + 1) % 5, (i + 2) % 5]).collect();
-        let band = Intrinsic::new(band, vec![[1.0; 3]; 5], &[0; 5]);
-        for (side, &other) in band.across.iter().enumerate().filter(|(_, other)| **other != NONE) {
-            assert_eq!(band.across[other as usize], side as u32);
-            assert_eq!(band.ends(side), { (band.ends(other as usize).1, band.ends(other as usize).0) });
-        }
+        let mut band = Intrinsic::glued(band, vec![[1.0; 3]; 5]);
         assert!(band.across.contains(&NONE));
+        let is_glued = |band: &Intrinsic| {
+            for (side, &other) in band.across.iter().enumerate().filter(|(_, other)| **other != NONE) {
+                let ((a, b), (c, d)) = (band.ends(side), band.ends(other as usize));
+                assert_eq!((band.across[other as usize], a, b), (side as u32, d, c));
+                assert_eq!(band.lengths[side / 3][side % 3], band.lengths[other as usize / 3][other as usize % 3]);
+            }
+        };
+        is_glued(&band);
+        band.close();
+        is_glued(&band);
+        assert!(!band.across.contains(&NONE) && band.corners.len() == 10);
     }
 }

@@ -4,7 +4,9 @@
 //! The equation as printed has the sign of -S and divides by a mean area, which is no Laplacian on an uneven mesh. Here S
 //! is the sum over triangles of their Dirichlet energies, so that it is positive semi-definite whatever the triangles are;
 //! they are those of the intrinsic Delaunay triangulation after mollification [Sharp2020], so that slivers neither turn
-//! weights negative nor make them huge. No length here is absolute: all are divided by the mean edge.
+//! weights negative nor make them huge. A is the area of what lies nearest to each vertex. Both are the surface's and its
+//! vertices' own [Bobenko2007]: where a cell of a grid could be cut by either diagonal, neither choice and no order of the
+//! triangles is seen. No length here is absolute: all are divided by the mean edge.
 //!
 //! Vertices at one position are one *sample*: a surface that was split along uv seams or creases hangs together, and its
 //! doubled vertices share one value. A sample's normal is the mean of its vertices' by area, and what tells these from each
@@ -20,10 +22,13 @@ use sprs::CsMat;
 /// No sample.
 pub const NOWHERE: u32 = u32::MAX;
 
+/// What lies nearest to a vertex is at least this share of a third of the triangles around it.
+const LEAST: f64 = 1e-3;
+
 /// By what the stiffness is divided.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Areas {
-    /// By the area around each vertex.
+    /// By the area of what lies nearest to each vertex.
     #[default]
     VertexArea,
     /// By the mean of all, as [Patro2007, eq. 4] is printed: where triangles are small, frequencies count as lower than they
@@ -161,13 +166,15 @@ fn components(corners: &[[u32; 3]], count: usize) -> Vec<u32> {
 }
 
 fn assemble(triangles: &Intrinsic, count: usize) -> (CsMat<f64>, Vec<f64>) {
-    let (mut areas, mut diagonal) = (vec![0.0; count], vec![0.0; count]);
+    let (mut areas, mut thirds, mut diagonal) = (vec![0.0; count], vec![0.0; count], vec![0.0; count]);
     let mut sides: Vec<(u32, u32, f64)> = Vec::with_capacity(6 * triangles.corners.len());
     for (t, corners) in triangles.corners.iter().enumerate() {
+        let nearest = triangles.nearest(t);
         for i in 0..3 {
-            areas[corners[i] as usize] += triangles.area(t) / 3.0;
+            areas[corners[i] as usize] += nearest[i] / triangles.sheets;
+            thirds[corners[i] as usize] += triangles.area(t) / (3.0 * triangles.sheets);
             let (a, b) = (corners[i], corners[(i + 1) % 3]);
-            let weight = 0.5 * triangles.cotangent(3 * t + i);
+            let weight = 0.5 * triangles.cotangent(3 * t + i) / triangles.sheets;
             // An edge that returns to where it began costs nothing.
             if a != b {
                 diagonal[a as usize] += weight;
@@ -176,6 +183,8 @@ fn assemble(triangles: &Intrinsic, count: usize) -> (CsMat<f64>, Vec<f64>) {
             }
         }
     }
+    // Parts of slivers cancel, and what is left may be less than their rounding: no cell is that small beside its triangles.
+    areas.iter_mut().zip(thirds).for_each(|(area, third)| *area = area.max(LEAST * third));
     (symmetric(&diagonal, &sides), areas)
 }
 
@@ -276,6 +285,43 @@ mod tests {
             let scaled = Laplacian::of(&mesh.transformed(&DAffine3::from_scale(DVec3::splat(k))), Areas::VertexArea);
             assert_eq!(scaled.stiffness, base.stiffness);
             assert_eq!(scaled.areas, base.areas);
+        }
+    }
+
+    #[test]
+    fn neither_diagonals_nor_orders_are_seen_where_cells_could_be_cut_by_either() {
+        let closed = shapes::slab(DVec3::splat(1.0), (12, 12));
+        // Its front alone is a sheet: bent to a fan of low trapezoids, it has obtuse angles at its border.
+        let mut sheet = Mesh { triangles: closed.triangles[..288].to_vec(), ..closed.clone() };
+        sheet
+            .positions
+            .iter_mut()
+            .for_each(|p| *p = (2.0 + p.y) * Vec3::new((4.0 * p.x).cos(), (4.0 * p.x).sin(), 0.0));
+        for (name, mesh) in [("cube", &closed), ("sheet", &sheet)] {
+            let base = Laplacian::of(mesh, Areas::VertexArea);
+            // Every second cell cut by its other diagonal, and all in reverse.
+            let mut other = mesh.clone();
+            for pair in other.triangles.chunks_exact_mut(2).step_by(2) {
+                let [one, two] = [pair[0], pair[1]];
+                let far = *two.iter().find(|v| !one.contains(v)).expect("a cell has four corners");
+                let k = one.iter().position(|v| !two.contains(v)).expect("one of each is its own");
+                let [near, next, last] = [0, 1, 2].map(|i| one[(k + i) % 3]);
+                pair.copy_from_slice(&[[near, next, far], [near, far, last]]);
+            }
+            other.triangles.reverse();
+            let thirds =
+                mesh.vertex_areas().iter().zip(other.vertex_areas()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let laplacian = Laplacian::of(&other, Areas::VertexArea);
+            assert_eq!(laplacian.sample, base.sample);
+            // The mean edge has another length with other diagonals.
+            let scale = (laplacian.edge / base.edge).powi(2);
+            let apart = laplacian.areas.iter().zip(&base.areas).map(|(a, b)| (a * scale - b).abs()).fold(0.0, f64::max);
+            assert!(apart < 1e-6 && thirds / base.edge.powi(2) > 0.01, "{name}: {apart}, thirds {thirds}");
+            let edges = laplacian.stiffness.iter().chain(base.stiffness.iter()).map(|(_, at)| at);
+            let weight = |of: &Laplacian, (i, j)| of.stiffness.get(i, j).copied().unwrap_or(0.0);
+            let apart = edges.map(|at| (weight(&laplacian, at) - weight(&base, at)).abs()).fold(0.0, f64::max);
+            assert!(apart < 1e-6, "{name}: {apart}");
+            assert!(base.stiffness.iter().all(|(w, (i, j))| i == j || *w < 1e-6), "{name}: no weight is negative");
         }
     }
 

@@ -28,7 +28,7 @@ use serde::{Deserialize, Serialize};
 
 use super::laplacian::{Areas, Laplacian, NOWHERE};
 use super::mesh::Mesh;
-use crate::problem::{Problem, Tick};
+use crate::problem::{Cause, Problem, Tick};
 use kernel::Kernel;
 
 /// Modes of the Laplacian, orthonormal by area, and what a field without its means has of each.
@@ -215,13 +215,17 @@ impl Harmonics {
 /// that normals do not have: what a kernel does beyond omega_m is not for a mean to say.
 pub fn all_harmonics(mesh: &Mesh, highest: f64, tick: Tick) -> Result<Harmonics, Problem> {
     let laplacian = Laplacian::of(mesh, Areas::VertexArea);
-    let samples = laplacian.samples();
+    let (samples, parts) = (laplacian.samples(), laplacian.components());
+    // One mode of frequency 0 each.
+    if parts * samples > MOST {
+        let what = format!("light on a mesh of {parts} separate parts does not fit into memory");
+        return Err(Problem::new(Cause::Unfinished, what).hint("signal: Normals, or a mesh of fewer parts"));
+    }
     let cut = FINEST.min(highest * laplacian.edge);
     let nothing = vec![DVec3::ZERO; samples];
     let (modes, reached) = harmonics::modes(&laplacian, &nothing, cut, tick)?;
     let per_unit = |per_edge: f64| per_edge / laplacian.edge;
     let area = laplacian.edge * laplacian.edge;
-    let parts = laplacian.components();
     let mut squares = vec![0.0; parts];
     let mut columns = vec![0.0f32; parts * samples];
     for (s, &c) in laplacian.component.iter().enumerate() {

@@ -4,7 +4,8 @@
 //! stands in the material, as `filter:`, per colour channel where its width is given per channel:
 //!
 //! - `Gaussian(width:)`, `Exponential(width:)`, `Diffusion(time_mm2:)`, `Box(wavelength:)` and `Curve(points:)` weigh
-//!   frequencies on the surface, in mm: the same on any mesh of the same shape.
+//!   frequencies on the surface, in mm: nearly the same on any mesh of the same shape, and the same however its vertices are
+//!   numbered.
 //! - `Normalized(std:)` is the paper's own Gaussian, whose axis the mesh's edges decide.
 //! - `FromMedium()`, the default, is (1 + (omega/sigma_tr)²)^(-3/2) with the medium's sigma_tr, per channel. A sigma_tr below
 //!   6 / size counts as that: normals average to nothing over a closed object, which light never does.
@@ -32,8 +33,9 @@
 //!
 //! Costs: the bake; after it a frame costs exactly what `Opaque` costs, with the same steps, and one pass over the
 //! vertices when the kernel is edited: that is the method's point. On the device lie two bytes per vertex and mode (at most
-//! 81 modes by Krylov; 64 MiB in all, and where that is less than there should be, modes end earlier) and 32 per vertex. A
-//! kernel that differs between channels has three normals: each light and the surroundings are then gathered three times.
+//! 81 modes by Krylov; 64 MiB in all, and where that is less than there should be, modes end earlier; filtered light has one
+//! more for each separate part of a mesh, and is refused where those alone take as much) and 32 per vertex. A kernel that
+//! differs between channels has three normals: each light and the surroundings are then gathered three times.
 //! Of a medium of strong colour they point apart, and so each colour of a bump has its own terminator: red light, which
 //! spreads farthest, reaches around it, as it does through skin. Where it spreads as far as a thing is thick, its normals are
 //! also the shortest, and lit sides turn green or blue, which light that is not lost would not do: give such a thing one width
@@ -166,6 +168,10 @@ impl FilteredNormals {
         }
         let (mm_per_unit, extent) = (surface.mm_per_unit(), surface.extent(member));
         match Kernels::of(member.material, 0.5 * extent * mm_per_unit) {
+            Some(Kernels::Spectral(kernels)) if kernels.iter().all(Kernel::is_identity) => {
+                plan.skip(format!("filtering the light of `{}`", member.name), "its kernel lets everything pass");
+                surface.irradiance(plan, member, member.mesh)
+            }
             Some(Kernels::Spectral(kernels)) => {
                 let highest = highest(&kernels, extent, mm_per_unit);
                 light::filtered(plan, surface, member, &kernels, highest)
