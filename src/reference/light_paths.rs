@@ -291,28 +291,33 @@ impl Field {
         let enters = light.dot(point.flat) < 0.0;
         let beyond = if enters { walk.inside.with(point.thing()) } else { walk.inside.without(point.thing()) };
         let facing = tracer.facing(thing, surface, point, light, walk.inside);
-        let is_open = |inside: Inside| inside.innermost().is_none();
         if facing.eta == 1.0 {
             walk.inside = beyond;
             return Some(());
         }
-        let reflectance = if is_refracted { 0.0 } else { facing.split(light).reflectance };
-        let is_reflection = random.unit() < reflectance;
-        let chance = if is_reflection { reflectance } else { 1.0 - reflectance };
-        let mut ways = facing.reversed(light, is_reflection);
-        if is_refracted && facing.normal != facing.flat {
+        // Where normals are interpolated there may be more ways than one, or none; direct light comes straight in, and does
+        // not come back.
+        let is_followed = |inside: Inside| tracer.light == Light::Full || inside.innermost().is_some();
+        let (reflected, refracted) = (facing.reversed(light, true), facing.reversed(light, false));
+        let ways = [
+            reflected[0].filter(|_| !is_refracted && is_followed(walk.inside)),
+            reflected[1].filter(|_| !is_refracted && is_followed(walk.inside)),
+            refracted[0].filter(|_| is_followed(beyond)),
             // Beams are those of the interpolated normals.
-            ways[1] = None;
-        }
-        let count = ways.iter().flatten().count();
-        let (to, share) = *ways.iter().flatten().nth(random.choice(count.max(1)))?;
-        walk.weight.value *= share * count as f64 / chance;
-        walk.direction = to;
-        if !is_reflection {
+            refracted[1].filter(|_| !is_refracted && is_followed(beyond)),
+        ];
+        let sum: f64 = ways.iter().flatten().map(|(_, share)| share).sum();
+        let mut at = random.unit() * sum;
+        let taken = ways.iter().position(|way| {
+            at -= way.map_or(0.0, |(_, share)| share);
+            at < 0.0
+        })?;
+        walk.weight.value *= sum;
+        walk.direction = ways[taken]?.0;
+        if taken >= 2 {
             walk.inside = beyond;
         }
-        // Direct light comes straight in, and does not come back.
-        (tracer.light == Light::Full || !is_open(walk.inside)).then_some(())
+        Some(())
     }
 }
 
