@@ -34,7 +34,7 @@ fn agree_with_plain(what: &str, mut tracer: Tracer, blocks: u64, ray: impl Fn(&m
     let z = (a - b) / error;
     println!("{what}: {a} +- {a_error}, {b} +- {b_error}, z {z}");
     assert!(z.abs().max_element() < 4.0, "{what}: {a} +- {a_error}, {b} +- {b_error}, z {z}");
-    assert!((0.08 * b / error).max_element() > 4.0, "{what}: {b} +- {error} would hide a bias of 8 %");
+    assert!((0.1 * b / error).max_element() > 4.0, "{what}: {b} +- {error} would hide a bias of 10 %");
 }
 
 fn knot() -> Mesh {
@@ -53,8 +53,8 @@ fn light_paths_change_nothing_but_noise() {
     let lamp = || Lamp { kind: rect.clone(), shadow: true };
     let things = || vec![(knot(), colored(-0.4)), (quad.clone(), Matter::Emitter(0))];
     let one = |sky, light, depth| tracer(things(), vec![lamp()], sky, light, depth);
-    agree_with_plain("a lamp with extent", one(None, Light::Full, 8), 3_000, from_around);
-    agree_with_plain("a sky", one(Some(1.0), Light::Direct, 6), 1_500, from_around);
+    agree_with_plain("a lamp with extent", one(None, Light::Full, 8), 2_000, from_around);
+    agree_with_plain("a sky", one(Some(1.0), Light::Direct, 6), 1_000, from_around);
     let suns = vec![sun(DVec3::new(-0.4, -0.5, -1.0))];
     let sunny = tracer(vec![(knot(), colored(0.3))], suns, None, Light::Full, 6);
     agree_with_plain("a lamp without extent", sunny, 500, from_around);
@@ -69,9 +69,9 @@ fn light_paths_leave_what_is_not_theirs() {
     let floor = Mesh { positions: floor.positions.iter().map(|p| *p - 1.3 * glam::Vec3::Y).collect(), ..floor };
     let white = Matter::Opaque { surface: surface(1.0, 0.0), albedo: Rgb::splat(0.9) };
     let things = vec![(knot(), colored(0.0)), (quad.clone(), Matter::Emitter(0)), (floor, white)];
-    agree_with_plain("a floor", tracer(things, vec![lamp()], None, Light::Full, 8), 3_000, from_around);
+    agree_with_plain("a floor", tracer(things, vec![lamp()], None, Light::Full, 8), 2_000, from_around);
     let glass = shapes::cuboid(DVec3::splat(2.6));
     let clear = translucent(1.2, 0.0, Rgb::splat(0.1), Rgb::splat(0.4), 0.9);
     let things = vec![(knot(), colored(0.0)), (quad, Matter::Emitter(0)), (glass, clear)];
-    agree_with_plain("within another", tracer(things, vec![lamp()], Some(0.5), Light::Full, 8), 1_500, from_around);
+    agree_with_plain("within another", tracer(things, vec![lamp()], Some(0.5), Light::Full, 8), 1_000, from_around);
 }
