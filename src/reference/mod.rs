@@ -17,6 +17,7 @@
 //! | [`path`] | a path on its way: what it lies in and what it weighs |
 //! | [`kin`] | what paths of neighbouring pixels share |
 //! | [`light_paths`] | paths that begin at lamps, and meet those from the eye |
+//! | `light_cells` | where they are likely, and the particles that they met |
 //! | [`film`] | means, variances, parts, tiles |
 //!
 //! Samples are added in steps that double their number; each step is a bake, named by the one before, so that what was
@@ -32,6 +33,7 @@ pub mod free_path;
 pub mod kin;
 pub mod layers;
 pub mod light;
+mod light_cells;
 pub mod light_paths;
 pub mod lobe;
 pub mod path;
