@@ -11,7 +11,6 @@
 //!
 //! Flux is counted as radiance is, per squared index.
 
-use super::boundary::Facing;
 use super::free_path::End;
 use super::kin::{self, Stem, Strand};
 use super::light::{Kind, Ray};
@@ -21,7 +20,6 @@ use super::random::Random;
 use super::volume::{Light, Tracer, around};
 use super::world::{Matter, Place, Point, Thing};
 use crate::optics::Rgb;
-use crate::scene::Varying;
 use glam::{DVec2, DVec3, IVec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -277,9 +275,7 @@ fn pick(sums: &[f64], at: f64) -> usize {
 /// Whether a thing is one that light paths pass through.
 fn is_passed(tracer: &Tracer, thing: usize) -> bool {
     let Thing { matter: Matter::Translucent { surface, .. }, .. } = &tracer.world.things[thing] else { return false };
-    let Varying::Constant(roughness) = surface.roughness else { return false };
-    let facing = Facing { flat: DVec3::Z, normal: DVec3::Z, eta: surface.ior, roughness };
-    surface.ior != 1.0 && facing.is_smooth() && tracer.world.strata[thing].is_none()
+    surface.ior != 1.0 && surface.is_smooth() && tracer.world.strata[thing].is_none()
 }
 
 impl Tracer {

@@ -12,7 +12,6 @@ use super::random::Random;
 use super::volume::Tracer;
 use super::world::{Boundary, Matter, Point, Thing};
 use crate::optics::Rgb;
-use crate::scene::Varying;
 use glam::DVec3;
 
 /// Which directions from a point show a lamp, as far as one can guess.
@@ -95,13 +94,7 @@ fn chance(tracer: &Tracer, lamp: &Lamp, thing: usize, p: DVec3) -> f64 {
 /// leaves; beams of lamps without extent through a smooth one are found by [`super::refracted`].
 fn shows<'a>(thing: &'a Thing, lamp: &Lamp) -> Option<&'a Boundary> {
     let Matter::Translucent { surface, .. } = &thing.matter else { return None };
-    let is_smooth = match surface.roughness {
-        Varying::Constant(roughness) => {
-            Facing { flat: DVec3::Z, normal: DVec3::Z, eta: surface.ior, roughness }.is_smooth()
-        }
-        Varying::Texture(_) => false,
-    };
-    (surface.ior != 1.0 && is_smooth == lamp.has_extent()).then_some(surface)
+    (surface.ior != 1.0 && surface.is_smooth() == lamp.has_extent()).then_some(surface)
 }
 
 impl Tracer {

@@ -11,7 +11,7 @@
 
 use super::boundary::Facing;
 use super::light::Kind;
-use super::world::{Boundary, Matter, Place, Thing, World};
+use super::world::{Matter, Place, Thing, World};
 use crate::optics::Rgb;
 use glam::{DVec2, DVec3, Vec3A};
 use obvhs::BvhBuildParams;
@@ -60,7 +60,7 @@ impl Refracted {
     /// None where no light is refracted by a smooth boundary: an index of 1, a rough one ([`super::lobe`]), a lamp with extent.
     pub fn new(world: &World, lamp: usize, kind: &Kind, thing: usize) -> Option<Refracted> {
         let Matter::Translucent { surface, .. } = &world.things[thing].matter else { return None };
-        if surface.ior == 1.0 || matches!(kind, Kind::Rect { .. }) || !is_smooth(surface) {
+        if surface.ior == 1.0 || matches!(kind, Kind::Rect { .. }) || !surface.is_smooth() {
             return None;
         }
         let body = &world.things[thing];
@@ -196,12 +196,6 @@ impl Refracted {
         let along = |axis: DVec3| Some((place(to + h * axis)? - place(to - h * axis)?) / (2.0 * h));
         Some(along(x)?.cross(along(y)?).length())
     }
-}
-
-/// Whether all of a boundary is smooth.
-fn is_smooth(surface: &Boundary) -> bool {
-    let crate::scene::Varying::Constant(roughness) = surface.roughness else { return false };
-    Facing { flat: DVec3::Z, normal: DVec3::Z, eta: surface.ior, roughness }.is_smooth()
 }
 
 impl Kind {

@@ -84,6 +84,15 @@ fn measure(
     (mean, ((squares / n - mean * mean).max(Rgb::ZERO) / n).sqrt())
 }
 
+/// The mean of what blocks of kin bring, and its standard error; a block counts as one sample.
+fn over_blocks(blocks: u64, block: impl Fn(u64) -> Rgb + Sync + Send) -> (Rgb, Rgb) {
+    let values: Vec<Rgb> = (0..blocks).into_par_iter().map(block).collect();
+    let n = blocks as f64;
+    let mean = values.iter().sum::<Rgb>() / n;
+    let squares = values.iter().map(|value| (*value - mean) * (*value - mean)).sum::<Rgb>();
+    (mean, (squares / (n * (n - 1.0))).sqrt())
+}
+
 /// Every channel within 4 standard errors, which must be small enough in one of them to notice a bias of 2 %.
 fn agree(what: &str, (mean, error): (Rgb, Rgb), expected: Rgb) {
     let error = error.max(1e-9 * expected);

@@ -38,6 +38,14 @@ pub struct Boundary {
     pub color: Varying<Rgb>,
 }
 
+impl Boundary {
+    /// Whether all of it is smooth.
+    pub fn is_smooth(&self) -> bool {
+        let Varying::Constant(roughness) = self.roughness else { return false };
+        Facing { flat: DVec3::Z, normal: DVec3::Z, eta: self.ior, roughness }.is_smooth()
+    }
+}
+
 /// Coefficients per scene unit, and the phase function's own parameter for each channel.
 #[derive(Clone, Debug, Serialize)]
 pub struct Medium {

@@ -17,11 +17,7 @@ fn measure_met(tracer: &Tracer, blocks: u64, ray: impl Fn(&mut Random) -> (DVec3
         tracer.meet_light(&mut strands, &lit, &mut Random::new(5, block, 0));
         strands.iter().map(|strand| strand.parts.scattered).sum::<Rgb>() / strands.len() as f64
     };
-    let values: Vec<Rgb> = (0..blocks).into_par_iter().map(block).collect();
-    let n = blocks as f64;
-    let mean = values.iter().sum::<Rgb>() / n;
-    let squares = values.iter().map(|value| (*value - mean) * (*value - mean)).sum::<Rgb>();
-    (mean, (squares / (n * (n - 1.0))).sqrt())
+    over_blocks(blocks, block)
 }
 
 fn agree_with_plain(what: &str, mut tracer: Tracer, blocks: u64, ray: impl Fn(&mut Random) -> (DVec3, DVec3) + Sync) {
